@@ -274,18 +274,15 @@ class CheckedFormulation:
     def own_pairing(self, interface: Interface, z: FloatArray) -> Pairing | None:
         """Return the pairing at one state z (n_unknowns,), with a handle if it has one; None without ``pair``."""
         self._check_size(interface, z)
-        self._check_depth(interface, z[: interface.n_unknowns].reshape(interface.nodes.shape))
+        reach, positions = self._traits.abilities.reach, z[: interface.n_unknowns].reshape(interface.nodes.shape)
+        if reach is not None and find_depth(interface, positions) > _BELOW_REACH * reach:
+            raise PluginError(_TOO_DEEP, "not asked")
         if "pair" not in self.provides:
             return None
         answer = _call_plugin("pair", self.plugin.pair, interface, freeze(z, np.float64))
         pairing = answer if isinstance(answer, Pairing) else _call_plugin("pair", Pairing, answer)
         pairing.check_bounds(interface)
         return pairing
-
-    def _check_depth(self, interface: Interface, positions: FloatArray) -> None:
-        reach = self._traits.abilities.reach
-        if reach is not None and find_depth(interface, positions) > _BELOW_REACH * reach:
-            raise PluginError(_TOO_DEEP, "not asked")
 
     def _pairing_at(self, interface: Interface, pairing: Pairing | None, z: Array) -> Pairing | None:
         return self.own_pairing(interface, z.real) if self.decides_anew(pairing) else pairing

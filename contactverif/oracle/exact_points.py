@@ -161,7 +161,6 @@ def _arm_and_along(lattice: Lattice, points: ExactPoints, segments: IntArray) ->
 
 
 def _sizes(vectors: Integers, scale: Any) -> FloatArray:
-    """Return the lengths of integer vectors (n, 2) over a scale, as floats."""
     parts = Ratios(vectors, np.broadcast_to(np.asarray(scale, dtype=object), len(vectors))[:, None]).floats()
     return np.hypot(parts[:, 0], parts[:, 1])
 

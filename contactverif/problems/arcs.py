@@ -85,6 +85,5 @@ class Arcs:
 
 
 def _directions(degrees: tuple[float, float], shares: FloatArray) -> FloatArray:
-    """Return unit vectors (n, 2) at shares (n,) of the way from one angle to another."""
     angles = np.radians(degrees[0] + (degrees[1] - degrees[0]) * shares)
     return np.column_stack([np.cos(angles), np.sin(angles)])

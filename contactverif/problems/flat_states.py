@@ -293,10 +293,7 @@ def touching_states() -> Iterator[Case]:
 def _touching(
     name: str, angles: list[float], shift: float, slave: tuple[float, ...], master: tuple[float, ...]
 ) -> Case:
-    """Return one pair of surfaces for each angle, in a row along the angle in the middle.
-
-    Places of their nodes along a flat surface are given; one node meets one.
-    """
+    """Return one pair of surfaces, one node meeting one, for each angle, in a row along the angle in the middle."""
     # Integer directions over a power of two, nearest to the angles; they are nearly unit vectors.
     exact = [[cos(radians(angle)), sin(radians(angle))] for angle in angles]
     along = np.round(np.array(exact) * _FINENESS) / _FINENESS  # (n_angles, 2)
@@ -466,7 +463,6 @@ def flat_face_state(
 
 
 def _sheets(corners: int) -> tuple[Sheet, Sheet]:
-    """Return a slave and a master."""
     slave, master = ([0.25, 1.375, 3.0], [0.5, 1.75, 2.5]), ([-0.5, 0.875, 1.75, 3.5], [-0.25, 1.0, 2.0, 3.25])
     return grid(*slave, corners=corners), grid(*master, corners=corners)
 

@@ -95,10 +95,7 @@ def long_states() -> Iterator[Case]:
 
 
 def _places(seed: int, count: int, *, graded: bool = False) -> FloatArray:
-    """Return ascending places (count + 1,) from 0 to 1; segments differ by up to a factor of 2.
-
-    Graded segments, an even number, are the shorter the nearer to 1/2.
-    """
+    """Return ascending places (count + 1,) from 0 to 1; graded segments, an even number, are shortest near 1/2."""
     random = np.random.default_rng(seed)
     if graded:
         half = np.geomspace(1.0, _FINEST, count // 2)

@@ -26,10 +26,7 @@ _PENETRATION = 2.0**-4
 
 
 def _squares(corners: int) -> tuple[Interface, FloatArray, FloatArray]:
-    """Return a square of two faces over one that is cut otherwise, and the nodes (n, 3) of both.
-
-    Triangles are cut along one diagonal and the other, quadrilaterals along y and along x.
-    """
+    """Return a square of two faces over one that is cut otherwise, and the nodes (n, 3) of both."""
     slave = master = _SQUARE
     faces = [_FIRST_DIAGONAL, _SECOND_DIAGONAL]
     if corners == QUADRILATERAL:
@@ -39,10 +36,7 @@ def _squares(corners: int) -> tuple[Interface, FloatArray, FloatArray]:
 
 
 def _cross_cuts(name: str, corners: int) -> Case:
-    """Return a square over a square, cut otherwise, with a penetration of 1/16 everywhere.
-
-    The consistent forces of slave and master are different, on triangles 1/3 and 1/6 of the pressure where nodes meet.
-    """
+    """Return a square 1/16 deep in another one, cut otherwise, so that their consistent forces are different."""
     interface, slave, master = _squares(corners)
     parameters = {
         "penetration": np.array(_PENETRATION),
@@ -55,10 +49,7 @@ def _cross_cuts(name: str, corners: int) -> Case:
 
 
 def _tilt_faces(name: str, corners: int) -> Case:
-    """Return a tilted square that penetrates a square and overhangs it, seen along its own normal.
-
-    It has a slope of 1/4 along x and 1/8 along y.
-    """
+    """Return a square with slopes of 1/4 and 1/8 that penetrates another one, and overhangs it along its own normal."""
     interface, slave, master = _squares(corners)
     tilted = slave + np.column_stack([np.zeros((len(slave), 2)), slave[:, :2] @ [0.25, 0.125] - 0.5])
     return Case(interface, np.vstack([tilted, master]).reshape(-1), 16.0, name=name)

@@ -47,10 +47,7 @@ def fit_to_traits(case: Case, traits: Traits) -> tuple[Case, str]:
 
 
 def _lift_flat(case: Case, traits: Traits) -> Case | None:
-    """Return a flat case of uniform penetration with a uniform gap; "penetration" is the gap then.
-
-    None if rounding the positions would make the gap another one.
-    """
+    """Return a flat case with a uniform gap, its "penetration" then; None if rounding would change it."""
     activation = activation_distance(case.interface, traits)
     gap = activation * np.random.default_rng([case.seed, 4]).uniform(LEAST, FLAT_LARGEST)
     if case.largest_coordinate * UNIT_ROUNDOFF > 2.0**-20 * gap:
@@ -95,7 +92,6 @@ def _lift_along(away: FloatArray, case: Case, activation: float) -> Case | None:
 
 
 def _place_apart(case: Case, positions: FloatArray, gap: float, activation: float) -> Case:
-    """Return a case at other positions, with the lengths of a barrier as parameters."""
     parameters = {**case.parameters, LEAST_GAP: np.array(gap), ACTIVATION: np.array(activation)}
     return replace(case, z=positions.reshape(-1), parameters=parameters)
 
@@ -147,7 +143,6 @@ def _distances(points: FloatArray, segments: FloatArray) -> tuple[FloatArray, Fl
 
 
 def _cross(slave: FloatArray, master: FloatArray) -> bool:
-    """Return whether any of some segments (n, 2, 2) crosses any of others (m, 2, 2)."""
 
     def sides(line: FloatArray, points: FloatArray) -> FloatArray:
         run = (line[:, 1] - line[:, 0])[:, None, None]
@@ -171,6 +166,5 @@ def _node_normals(surface: Surface, positions: FloatArray) -> FloatArray:
 
 
 def _is_closed(surface: Surface) -> bool:
-    """Return whether a chain of a surface has no free end."""
     first = surface.chain_order[surface.chain_starts]
     return bool((surface.neighbours[first, 0] >= 0).any())

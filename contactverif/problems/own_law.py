@@ -65,10 +65,7 @@ def is_nonlinear(case: Case, subject: Subject) -> bool:
 
 
 def _pressure(case: Case, subject: Subject, penalty: float, depth: float) -> float:
-    """Return the pressure on the pair at a depth. Its shortest segment is as long as that of the case.
-
-    It has a second segment, as long as the longest of the slave, and the master goes beyond both ends by as much.
-    """
+    """Return the pressure on the pair, whose shortest and longest segments are those of the case, at a depth."""
     mesh, dim = case.interface, case.interface.dim
     stretch = (case.slave_measure / float(mesh.slave.measures(mesh.nodes).sum())) ** (1 / (dim - 1))
     short = min(float(side.heights(mesh.nodes).min()) for side in (mesh.slave, mesh.master))

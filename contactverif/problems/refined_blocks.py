@@ -57,7 +57,6 @@ def refinements(case: Case) -> tuple[Scene, ...]:
 
 
 def _row_lines(first: float) -> FloatArray:
-    """Return the heights (n,) of the lines between rows, from 0 to the height of the block."""
     lines, height = [0.0], first
     while lines[-1] + height < HEIGHT:
         lines.append(lines[-1] + height)
@@ -142,7 +141,6 @@ def wave_work(scene: Scene, wavy: Scene, before: FloatArray, after: FloatArray) 
 
 @cache
 def _uniform_blocks(n_slave: int, n_master: int) -> Scene:
-    """Return the blocks under the mean pressure, with a penalty of 1."""
     rows = np.linspace(0, HEIGHT, N_ROWS + 1)
     slave_x, t = LENGTH * (np.linspace(0, 1, n_slave + 1) - 0.5), np.linspace(0, 1, n_master + 1)
     master_x = LENGTH * (t - 0.5 + (GRADING * t * (1 - t) if n_slave != n_master else 0))

@@ -223,10 +223,7 @@ def shrink_fit(
 
 @cache
 def _ring(problem: ShrinkFit, ring: Role, refine: float, grading: float, quarters: int) -> Body:
-    """Return a ring or a quarter of it, nodes ring by ring from the inside, each from angle 0 onwards.
-
-    A quarter is held across its cuts. Whole rings are held by as few nodes on the axes, away from contact.
-    """
+    """Return a ring or a quarter, held away from contact; nodes ring by ring from the inside, each from angle 0."""
     index = int(ring == "outer")
     contact = problem.contact_radii[index]
     limits = (contact, problem.outer_radius) if index else (problem.inner_radius, contact)

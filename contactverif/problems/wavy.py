@@ -100,10 +100,9 @@ class WavyProblem:
     def displacements(self, body: int, places: FloatArray) -> FloatArray:
         """Return the displacements (..., 2) of a body at reference places (..., 2), those of the interface included.
 
-        With the depth η and u_η into the body:
-        u_x = −p1/(E'k) sin kx [(1−kη) − ν'(1+kη)] e^{−kη} and
-        u_η = p1/(E'k) cos kx [2 + (1+ν')kη] e^{−kη} + p̄(H−η)/M.
-        The upper body moves down by the approach Δ too. The waviness of the surface counts for nothing here.
+        With the depth η and u_η into the body: u_x = −p1/(E'k) sin kx [(1−kη) − ν'(1+kη)] e^{−kη} and u_η = p1/(E'k)
+        cos kx [2 + (1+ν')kη] e^{−kη} + p̄(H−η)/M. The upper body moves down by the approach Δ too. The waviness of the
+        surface counts for nothing here.
         """
         k, modulus, ratio, into = self.wave_number, self.plane_modulus(body), self.plane_ratio(body), _INTO[body]
         depth = into * places[..., 1]

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 from hypothesis import strategies as st
-from hypothesis.strategies import DrawFn, SearchStrategy
+from hypothesis.strategies import DrawFn
 
 from contactverif.contract.case import Case, random_source
 from contactverif.contract.interface import TRIANGLE, Interface, Surface
@@ -17,20 +17,14 @@ _COMPANY = st.sampled_from([None, None, 0, 1])  # The place of a face in contact
 
 
 @random_source("contactverif.strategies.beside.beside_cases")
-def beside_cases(
-    interface: Interface | None = None, faces: tuple[int, ...] = (TRIANGLE,)
-) -> SearchStrategy[Case] | None:
+@samples.on_own_meshes
+def beside_cases(draw: DrawFn, faces: tuple[int, ...] = (TRIANGLE,)) -> Case:
     """Return flat slaves, as deep as ones in contact, whose distance from the master is 1e-12 to 2000 longest edges.
 
     In half of the cases one more slave face is in contact, without a node of the others. The parameter "beside"
     (n_slave_nodes,) is 1 at a node that lies beside; the others are those of `hard_corner_states`, for the forces on
     these nodes, which are 0 from one longest master edge on. There are no cases on an interface of the user.
     """
-    return _beside_states(faces) if interface is None else None
-
-
-@st.composite
-def _beside_states(draw: DrawFn, faces: tuple[int, ...]) -> Case:
     # Rectangles: far beside another quadrilateral a foot on its bilinear continuation may not exist.
     master, slave = (draw(surface_grids(most=most, faces=faces, straight=True)) for most in (3, 2))
     quarter, degrees = draw(st.integers(0, 3)), draw(st.one_of(st.just(0), st.integers(1, 89)))
@@ -44,9 +38,7 @@ def _beside_states(draw: DrawFn, faces: tuple[int, ...]) -> Case:
     # Complex numbers are places in the plane. The slave's square is turned as the way to it is turned off an edge.
     turn = np.exp(1j * np.deg2rad(degrees))
     away, half = 1j**quarter * turn, size * (turn.real + turn.imag) / 2
-    nearest = (
-        0.5 + 0.5j + 1j**quarter * (0.5 + 0.5j * (degrees > 0))
-    )  # The middle of an edge of the master, or a corner
+    nearest = 0.5 + 0.5j + 1j**quarter * (0.5 + 0.5j * (degrees > 0))  # The middle of a master edge, or a corner
     aside = place / 8 * (size if degrees else 1.0) * 1j
     here = nearest + away * (distance + half + aside + size * turn * ((slave.points() - 0.5) @ [1, 1j]))
     parts = [(np.column_stack([here.real, here.imag]), slave)]
@@ -59,9 +51,8 @@ def _beside_states(draw: DrawFn, faces: tuple[int, ...]) -> Case:
     plane = np.vstack([*(points for points, _ in parts), below])
     master_faces = np.random.default_rng(seed).permutation(master.faces() + len(beside))
     current = np.column_stack([plane, np.where(np.arange(len(plane)) < len(beside), -depth, 0.0)])
-    interface = Interface(
-        current * [1.0, 1.0, 0.0] * motion.scale, Surface(np.vstack(slave_faces)), Surface(master_faces)
-    )
+    surfaces = Surface(np.vstack(slave_faces)), Surface(master_faces)
+    interface = Interface(current * [1.0, 1.0, 0.0] * motion.scale, *surfaces)
     bounds = np.array([0.0, 0.0 if distance >= longest else depth * size**2 * motion.scale**3])
     parameters = {
         "beside": beside,

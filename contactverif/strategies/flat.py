@@ -79,11 +79,7 @@ def _panels() -> SearchStrategy[list[Sides]]:
 def _places(
     refinement: int, repeats: int, slave: Sequence[float], master: Sequence[float], left: int, right: int, sevenths: int
 ) -> Sides:
-    """Return a slave chain and a master chain that goes beyond it by `left` and `right`.
-
-    The last master segment is what its lengths do not cover, and what is too much is cut; refined lengths are repeated.
-    The slave moves into the left overhang by some sevenths of it.
-    """
+    """Return a slave chain, and a master chain that goes beyond it by `left` and `right`; the last one is cut."""
     slave_x = samples.ends_of([*slave] * repeats)
     end = slave_x[-1] + right
     master_x = [-float(left)]
@@ -148,11 +144,7 @@ def _class_places(
     right: int,
     inner: bool,
 ) -> Sides:
-    """Return a slave chain, and a master chain made from it.
-
-    Where the master ends with the slave, their end nodes coincide. Where it goes beyond, one of its inner nodes may lie
-    on the slave's end node, unless `inner` says that only inner nodes of the slave carry one.
-    """
+    """Return a slave chain, and a master chain with nodes on its nodes; `inner` leaves the slave's end nodes free."""
     segments = np.array([*slave] * repeats)
     slave_x = samples.ends_of(segments)
     carries, middle_carries = (samples.repeat_cyclically(each, len(slave_x)) == 1 for each in (at_nodes, at_middles))

@@ -60,7 +60,6 @@ def _radial_factor(slave: FloatArray, polygon: FloatArray, depth: float, *, outs
 
 
 def _covered_halves(x: FloatArray, begin: float, end: float) -> list[tuple[float, float]]:
-    """Return the halves of segments between ascending places that lie between `begin` and `end`."""
     pairs = [(left, right, (left + right) / 2) for left, right in pairwise(x.tolist())]
     halves = [half for left, right, middle in pairs for half in ((left, middle), (middle, right))]
     return [half for half in halves if begin <= half[0] and half[1] <= end]
@@ -203,10 +202,7 @@ class Broken:
         return samples.Panel(_sink_below(slave, line, self.unit * length / 4), line[::-1], reference)
 
     def _master(self, offsets: Sequence[int]) -> FloatArray:
-        """Return points (n, 2) from left to right; no wall stands on a wall, so that no two nodes can coincide.
-
-        With an offset walls lean and bends are uneven, so that nothing is seen exactly edge-on.
-        """
+        """Return points (n, 2) from left to right; no wall stands on a wall, and with an offset nothing is edge-on."""
         points, wall = [(0.0, 0.0)], False
         for index, ((along, up, kind), offset) in enumerate(zip(self.steps, cycle(offsets), strict=False)):
             wall = kind == _WALL and not wall
@@ -274,10 +270,7 @@ def tie_cases(draw: DrawFn) -> Case:
 def _facing(
     segments: Sequence[tuple[float, int]], rises: Sequence[float], quarters: Sequence[int], unit: float
 ) -> samples.Panel:
-    """Return a panel with master nodes under all slave nodes.
-
-    Under some slave segments one quarter point or the middle has a master node too (0: none).
-    """
+    """Return a panel with master nodes under all slave nodes, and under some quarter points or middles (0: none)."""
     slave_x, master_x = [0.0], [0.0]
     for length, quarter in segments:
         if quarter:

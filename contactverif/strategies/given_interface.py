@@ -150,10 +150,7 @@ def touches(interface: Interface, positions: FloatArray) -> bool:
 
 
 def _look(interface: Interface, positions: FloatArray, points: FloatArray) -> tuple[FloatArray, FloatArray, BoolArray]:
-    """Return gaps (n,) and normals (n, 2) of points (n, 2) at the master segments nearest to them.
-
-    The third array says which points are over their segment, and not past its ends.
-    """
+    """Return gaps (n,) and normals (n, 2) of points (n, 2) at the nearest master segments, and which are over these."""
     ends = positions[interface.master.segments]  # (n_segments, 2 ends, dim)
     first, along = ends[:, 0], ends[:, 1] - ends[:, 0]
     length = np.hypot(*along.T)

@@ -94,11 +94,7 @@ class Sketch:
 
 @st.composite
 def _cases_of_kind(draw: DrawFn, kind: str, sketches: SearchStrategy[Sketch]) -> Case:
-    """Draw a sketch and put it somewhere.
-
-    Many kinds are open, edge-on or past an end. So most cases have company: beside the sketch stands a slave segment in
-    contact with a master segment.
-    """
+    """Draw a sketch and put it somewhere, mostly beside a pair in contact, since many kinds are open or past an end."""
     sketch = draw(sketches)
     if sketch.mirrored and draw(st.booleans()):
         sketch = sketch.mirror()
@@ -186,10 +182,7 @@ def _angle(draw: DrawFn, degrees: float) -> Sketch:
 
 
 def _one_of_several(draw: DrawFn, role: str) -> Sketch:
-    """Draw a slave segment over three to six master segments; its point is over the first, the last, or another.
-
-    The order is that of the master, which runs in −x.
-    """
+    """Draw a slave segment over three to six master segments; its point is over the first, the last, or another."""
     width = draw(_WHOLE_LENGTHS)
     c = draw(st.sampled_from({"first": (0.5, 1.0), "intermediate": (0.0, -0.5, 0.5), "last": (-0.5, -1.0)}[role]))
     # Master nodes lie at odd sixteenths of the slave segment, and the point at an eighth.
@@ -232,10 +225,7 @@ def _small_overlap(draw: DrawFn) -> Sketch:
 
 
 def _closing_segment(draw: DrawFn) -> Sketch:
-    """Draw a disc or a hole, and a point over the segment that joins its last node to the first.
-
-    The slave is open, or a closed box whose own closing segment carries the point.
-    """
+    """Draw a disc or a hole, and a point over its closing segment; the slave is open, or a closed box."""
     length, (x, y) = draw(_feet_inside())
     height = length * draw(st.sampled_from([-1.0, 1.0, -2.0, 2.0]))  # Below the x-axis is a disc, above it a hole.
     between = draw(st.sampled_from([[], [0.5], [0.25, 0.75]]))
@@ -274,10 +264,7 @@ def _other_node(draw: DrawFn) -> Sketch:
 
 
 def _node_hit(draw: DrawFn) -> Sketch:
-    """Draw a point whose foot on the nearest segment is exactly a node between two segments.
-
-    The left segment is collinear, or bent to the side where the node stays nearest.
-    """
+    """Draw a point whose foot is exactly a node between two segments, collinear or bent so that it stays nearest."""
     gap, right, left = draw(_NONZERO_GAPS), draw(_SIDES), draw(_SIDES)
     slope = draw(_SLOPES) * (1 if gap < 0 else -1)
     line = [(-left, slope * left), (0.0, 0.0), (right, 0.0), *((right + length, 0.0) for length in draw(_ENDS))]
@@ -416,11 +403,7 @@ def projection_states(draw: DrawFn, interface: Interface) -> Case:
 def _set_point(
     interface: Interface, point: tuple[int, float], foot: tuple[int, float], gap: float, degrees: float
 ) -> FloatArray:
-    """Return positions (n_nodes, 2) with the slave moved as a whole.
-
-    Its point c on a segment gets to `gap`, in lengths of the master segment, above ξ there. Both segments then run
-    against each other, up to so many degrees.
-    """
+    """Return positions (n_nodes, 2) with the slave's point c at `gap`, in master segments, above ξ, and turned."""
     positions = interface.nodes.copy()
     first, second = positions[interface.master.segments[foot[0]]]
     along = second - first

@@ -145,10 +145,7 @@ def _layout(draw: DrawFn, slope: float) -> tuple[FloatArray, FloatArray, float]:
 
 
 def _place(draw: DrawFn, slave: FloatArray, master: FloatArray, near: bool = False, **others: FloatArray) -> Case:
-    """Return the case after a motion that rounds nothing; `others` become parameters, points (n, 2) moved alike.
-
-    Heights with many bits have none left for a motion that is not `near`.
-    """
+    """Return the case after a motion that rounds nothing, without a shift if `near`; it moves `others` (n, 2), too."""
     motion, penalty = draw(samples.exact_turns()), draw(samples.PENALTIES)
     motion = replace(motion, shift=(0, 0)) if near else motion
     seed, shuffle = draw(samples.SEEDS), draw(samples.SHUFFLES)

@@ -171,7 +171,6 @@ class SurfacePair:
         return Interface(nodes, Surface(faces[0]), Surface(faces[1])), plane, _SQUARE * factors
 
     def _master_points(self, slave: FloatArray) -> FloatArray:
-        """Return the master's nodes (n, 2) before the stretch."""
         if self.matched and self.same_domain:
             return slave
         if self.matched:
@@ -231,9 +230,8 @@ _QUARTERS = st.integers(1, 8)  # The penetration of the middle, in quarters of a
 
 
 @random_source("contactverif.strategies.surfaces.uniform_surfaces.flat_surface_cases")
-def flat_surface_cases(
-    interface: Interface | None = None, faces: tuple[int, ...] = (TRIANGLE,)
-) -> SearchStrategy[Case] | None:
+@samples.on_own_meshes
+def flat_surface_cases(draw: DrawFn, faces: tuple[int, ...] = (TRIANGLE,)) -> Case:
     """Return cases of uniform penetration in space; the master covers the slave.
 
     Their parameters are "penetration" (|g| > 0, a length), "plane" (n_nodes, 2) (coordinates of the nodes in the plane
@@ -241,27 +239,24 @@ def flat_surface_cases(
     (3,) (the unit vector out of the master). Half of the quadrilaterals are rectangles. There are no cases on an
     interface of the user.
     """
-    return _flat_states(surface_pairs(faces=faces, straight=True, skewed=True)) if interface is None else None
+    return _penetrate_uniformly(draw, surface_pairs(faces=faces, straight=True, skewed=True))
 
 
 @random_source("contactverif.strategies.surfaces.uniform_surfaces.matched_surface_cases")
-def matched_surface_cases(
-    interface: Interface | None = None, faces: tuple[int, ...] = (TRIANGLE,)
-) -> SearchStrategy[Case] | None:
+@samples.on_own_meshes
+def matched_surface_cases(draw: DrawFn, faces: tuple[int, ...] = (TRIANGLE,)) -> Case:
     """Return cases as `flat_surface_cases` does, with each master node over the slave on a slave node."""
-    return _flat_states(_matched_pairs(faces)) if interface is None else None
+    return _penetrate_uniformly(draw, _matched_pairs(faces))
 
 
 @random_source("contactverif.strategies.surfaces.uniform_surfaces.overhung_surface_cases")
-def overhung_surface_cases(
-    interface: Interface | None = None, faces: tuple[int, ...] = (TRIANGLE,)
-) -> SearchStrategy[Case] | None:
+@samples.on_own_meshes
+def overhung_surface_cases(draw: DrawFn, faces: tuple[int, ...] = (TRIANGLE,)) -> Case:
     """Return cases as `flat_surface_cases` does, with a master that goes beyond the slave on all sides."""
-    return _flat_states(surface_pairs(same_domain=False, faces=faces, straight=True)) if interface is None else None
+    return _penetrate_uniformly(draw, surface_pairs(same_domain=False, faces=faces, straight=True))
 
 
-@st.composite
-def _flat_states(draw: DrawFn, pairs: SearchStrategy[SurfacePair]) -> Case:
+def _penetrate_uniformly(draw: DrawFn, pairs: SearchStrategy[SurfacePair]) -> Case:
     pair = draw(pairs)
     quarters, unit = draw(_QUARTERS), draw(samples.depth_units())
     motion, penalty, seed = draw(space_motions()), draw(samples.PENALTIES), draw(samples.SEEDS)
@@ -310,19 +305,13 @@ def smooth_surface_cases(
 
 
 @random_source("contactverif.strategies.surfaces.tilted_surfaces.translated_surface_cases")
-def translated_surface_cases(
-    interface: Interface | None = None, faces: tuple[int, ...] = (TRIANGLE,)
-) -> SearchStrategy[Case] | None:
+@samples.on_own_meshes
+def translated_surface_cases(draw: DrawFn, faces: tuple[int, ...] = (TRIANGLE,)) -> Case:
     """Return turned states near the origin that a translation by the parameter "shift" (3,) moves exactly.
 
     State and reference are rounded to multiples of 2^-33, and the translation goes up to 2^20.
     """
     pairs = surface_pairs(same_domain=False, stretched=False, most=3, faces=faces)
-    return _translated_states(pairs) if interface is None else None
-
-
-@st.composite
-def _translated_states(draw: DrawFn, pairs: SearchStrategy[SurfacePair]) -> Case:
     case = draw(_tilted_states(pairs, space_motions(furthest=0, exponents=0), smooth=True))
     shift = np.array([draw(_PLACES), draw(_PLACES), draw(_PLACES)], dtype=np.float64)
     nodes, z = (samples.on_lattice(values, _FINENESS) for values in (case.interface.nodes, case.z))

@@ -85,10 +85,7 @@ def exact_shifts() -> SearchStrategy[FloatArray]:
 def _master_line(
     lengths: Sequence[int], width: int, rises: Sequence[int], offsets: Sequence[int], *, covers: bool, several: bool
 ) -> FloatArray:
-    """Return the master's points (n, 2) from left to right, beyond the slave at both ends or short of it.
-
-    It is short of the slave's last node, and of the first one too unless the slave may have no other.
-    """
+    """Return the master's points (n, 2) from left to right, beyond the slave at both ends, or short of it."""
     begin, end = (-1.0, width + 1.0) if covers else (0.5 if several else -1.0, width - 0.375)
     x = [begin, *(place for place in accumulate(lengths, initial=0) if begin < place < end), end]
     shift = samples.repeat_cyclically(offsets, len(x)) / 13 / 16
@@ -141,10 +138,7 @@ def sliding_cases(draw: DrawFn) -> Case:
 
 
 def _opens_at_once(slave: FloatArray, line: FloatArray, way: float) -> bool:
-    """Return whether a length of the slave (n, 2), which slides by a way, leaves the line (m, 2) in one moment.
-
-    It is parallel to a segment of the line then, and both are in touch there after a share of the way.
-    """
+    """Return whether a length of the slave (n, 2), parallel to the line (m, 2) in touch, leaves it in one moment."""
     for (a, b), (p, q) in product(pairwise(slave), pairwise(line)):
         slope, other = ((end[1] - start[1]) / (end[0] - start[0]) for start, end in ((a, b), (p, q)))
         if abs(slope - other) > _PARALLEL:

@@ -132,7 +132,6 @@ def _areas(state: FrozenState, rules: Rules) -> tuple[FloatArray, FloatArray]:
 
 
 def _move_by_roundoff(case: Case) -> Iterator[Case]:
-    """Yield the case with its nodes moved at random by what roundoff may do."""
     reach = COORDINATE_ROUNDING * case.largest_coordinate
     for direction in random_moves(case.seed, N_MOVES, case.z.size):
         yield replace(case, z=case.z + reach * direction)
@@ -186,7 +185,6 @@ Direction = tuple[float, ...]  # A unit vector, which a set holds once.
 
 @random_source("contactverif_properties.shared.openings.pushing_cases")
 def _pushing_cases(interface: Interface | None = None) -> dict[str, SearchStrategy[Case]]:
-    """Return flat cases with a uniform penetration, and states of any shape, each half of all cases."""
     flat = flat_cases(interface)
     return ({} if flat is None else {FLAT: flat}) | {ANY_SHAPE: general_cases(interface)}
 
@@ -195,7 +193,6 @@ def _pushing_cases(interface: Interface | None = None) -> dict[str, SearchStrate
 def _pushing_surfaces(
     interface: Interface | None = None, faces: tuple[int, ...] = (TRIANGLE,)
 ) -> dict[str, SearchStrategy[Case]]:
-    """Return flat cases in space with a uniform penetration, and tilted and warped ones, each half of all cases."""
     cases = {FLAT: flat_surface_cases(interface, faces), ANY_SHAPE: surface_cases(interface, faces)}
     return {kind: strategy for kind, strategy in cases.items() if strategy is not None}
 
@@ -290,12 +287,7 @@ def unilateral(case: Case, subject: Subject) -> Measurement:
 
 
 def _measure_flat_contact(case: Case, subject: Subject) -> Measurement:
-    """Lift a flat interface until all gaps are as wide as the penetration was deep, and until all but an end is open.
-
-    The force far from the contact zone is missing where no node is that far, and with multipliers, since
-    `complementarity` judges those that pull. The pull of a contact point is that of the flat state and of the one with
-    a closed end. The measurement is broken if nothing begins where the surfaces penetrate, or if the slave is pulled.
-    """
+    """Lift a flat interface until all is open, and until all but an end is; `complementarity` judges multipliers."""
     formulation, interface, depth = subject.for_case(case), case.interface, case.parameter("penetration")
     size = case.penalty * depth * case.slave_measure
     distance = activation_distance(interface, subject.traits)  # 0 where contact begins in touch.
@@ -318,7 +310,7 @@ def _measure_flat_contact(case: Case, subject: Subject) -> Measurement:
         broken = "nothing begins where the surfaces penetrate"
         begins = {bool(_contact_forces(formulation, moved).any()) for moved in _move_by_roundoff(case)}
         undecided = "a kink: moved by roundoff, it begins one way and not another" if len(begins) == 2 else ""
-    elif _push_of_slave(pushes, case) < 0:
+    elif (pushes[: interface.n_slave_nodes] @ normal_of(case)).sum() > 0:  # A residual that pulls the slave.
         broken = OPPOSITE_SIGN
     measurement = Measurement(check_all(values, tolerances), undecided, broken, idle=bool(undecided))
     if values[OPEN] or broken:  # What is broken is so in the state that is drawn.
@@ -329,7 +321,6 @@ def _measure_flat_contact(case: Case, subject: Subject) -> Measurement:
 
 
 def _measure_barrier(case: Case, subject: Subject) -> Measurement:
-    """Open the uniform gap of a flat interface beyond the activation distance, and halve it again and again."""
     gap, activation = case.parameter("penetration"), case.parameter(ACTIVATION)
     gaps = _halve_gap(case, gap, gap)
     outside = [BEYOND * activation, 2 * activation]
@@ -341,12 +332,10 @@ def _measure_barrier(case: Case, subject: Subject) -> Measurement:
         growth = _growth(pushes)
         # At a free end that a node faces exactly, roundoff may lose a spring at one gap and find it at the next.
         values[GROWTH] = float(np.median(growth[len(growth) // 2 :]))
-    broken = "nothing begins within the activation distance" if not pushes[0] else ""
-    if pushes[0] < 0:
-        broken = OPPOSITE_SIGN
-    measurement = Measurement(check_all(values, {OPEN: 0.0, GROWTH: LEAST_GROWTH}), broken=broken)
+    broken = OPPOSITE_SIGN if pushes[0] < 0 else "" if pushes[0] else "nothing begins within the activation distance"
     action = f"with gaps of {outside[0]:.4g} and {outside[1]:.4g}, and halved from {gap:.4g} on"
-    return measurement.after(action, OPEN, GROWTH)
+    numbers = check_all(values, {OPEN: 0.0, GROWTH: LEAST_GROWTH})
+    return Measurement(numbers, broken=broken).after(action, OPEN, GROWTH)
 
 
 def _halve_gap(case: Case, largest: float, length: float) -> FloatArray:
@@ -390,15 +379,13 @@ def intersection_free(case: Case, subject: Subject) -> Measurement:
     to a large load. A force that jumps at a border keeps Newton's method from the solution there.
 
     **How it is judged.** The gap is halved from 1/256 of the length to the nearest other node, down to 2^-40 of the
-    activation distance, or to 4096 u X, where rounding the positions begins to decide it. The force is half of the
-    difference of what pushes the slave and what pushes the master, along the way. It must grow at every halving. Its
-    work has no bound only if the sum of gap × force over all halvings has none. This product may fall as 1/k at the
-    k-th halving does, to half of what it was half-way; with a force that goes with gap^-1/2 it falls to 2^-8.
+    activation distance, or to 4096 u X, where rounding the positions begins to decide it. The force along the way, the
+    mean of both sides, must grow at every halving. Its work has no bound if gap × force falls as 1/k at the k-th, to
+    half of what it was half-way; with a force that goes with gap^-1/2 it falls to 2^-8.
 
     Then the node stands over an end of a segment, at a random gap, and steps over the normal there. The last number is
     the largest change of a nodal force over the largest force. The vertices are convex, or all but straight: there the
-    slope of a distance is continuous. Lengths, slopes, places and gaps are drawn by their exponents. A barrier that
-    weights gaps, or looks from one surface, may be right without this promise.
+    slope of a distance is continuous. A barrier that weights gaps, or looks from one surface, may lack this promise.
 
     **Undecided.** A case whose positions are so large that no gap is left to be halved.
     """
@@ -426,9 +413,8 @@ def intersection_free(case: Case, subject: Subject) -> Measurement:
     measurement = Measurement(check_all(values, {GROWTH: LEAST_GROWTH, WORK: LEAST_WORK, JUMP: LARGEST_JUMP}))
     closing = describe_node(case.interface, int(node))
     measurement = measurement.after(f"{closing} at a gap of {height:.4g} beside a vertex", JUMP)
-    return measurement.after(
-        f"{closing} closed from a gap of {gaps[np.argmin(growth)]:.4g} to half of it", GROWTH, WORK
-    )
+    action = f"{closing} closed from a gap of {gaps[np.argmin(growth)]:.4g} to half of it"
+    return measurement.after(action, GROWTH, WORK)
 
 
 def _contact_forces(formulation: CheckedFormulation, case: Case) -> FloatArray:
@@ -436,11 +422,6 @@ def _contact_forces(formulation: CheckedFormulation, case: Case) -> FloatArray:
     state = FrozenState.with_multiplier(formulation, case, 0.0)
     whole = unit_forces(state).sum(axis=1) if state.case.n_multipliers else state.forces
     return whole.reshape(case.interface.nodes.shape)
-
-
-def _push_of_slave(forces: FloatArray, case: Case) -> float:
-    """Return the total force on the slave along the master's outward normal."""
-    return -float((forces[: case.interface.n_slave_nodes] @ normal_of(case)).sum())
 
 
 def _pull_of_points(state: FrozenState) -> tuple[float, float] | None:

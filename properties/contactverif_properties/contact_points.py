@@ -113,9 +113,8 @@ class _Places:
             over, xi = np.where(view.cosine > 0, 1 / np.abs(view.cosine), np.inf), view.xi.floats()
         size = view.lengths + distant
         gap_size = size + distant * np.maximum(0, np.maximum(-xi, xi - 1))
-        foot_size = gap_size + distant * np.abs(view.gap.floats()) / (
-            view.master_length if closest else view.slave_length
-        )
+        carrier = view.master_length if closest else view.slave_length
+        foot_size = gap_size + distant * np.abs(view.gap.floats()) / carrier
         return cls(lattice, points, exact, view, size * over, gap_size * over, foot_size * over)
 
 
@@ -142,7 +141,6 @@ FLAT, TILTED, LAYERED = "flat faces", "tilted and warped faces", "a second layer
 
 @random_source("contactverif_properties.shared.face_places.projected_faces")
 def _projected_faces(interface: Interface | None = None) -> dict[str, SearchStrategy[Case]] | None:
-    """Return flat cases in space, tilted and warped ones, and flat ones with another layer behind the master."""
     cases = {FLAT: flat_surface_cases(interface), TILTED: surface_cases(interface), LAYERED: layered_cases(interface)}
     if interface is not None and interface.slave.faces.shape[1] + interface.master.faces.shape[1] > 2 * TRIANGLE:
         return None  # A foot on a quadrilateral is a root, and no exact number.
@@ -243,7 +241,6 @@ class _FacePlaces:
 
 
 def _longest_edges(corners: FloatArray) -> FloatArray:
-    """Return the longest edge (n,) of faces with corners (n, n_corners, 3)."""
     longest: FloatArray = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1, initial=0.0)
     return longest
 
@@ -408,7 +405,6 @@ def _find_errors_on_faces(each: Pass, reported: _Reported) -> Iterator[FloatArra
 
 
 def _size(errors: FloatArray, active: BoolArray) -> FloatArray:
-    """Return |errors|; 0 in place of NaN where a point is idle."""
     return np.where(np.isnan(errors) & ~active, 0.0, np.abs(errors))
 
 
@@ -451,10 +447,8 @@ def projection_activity(case: Case, subject: Subject) -> Measurement:
     both = [_Reported.from_case(state, subject) for state in (case, large)]
     wrong, decided = zip(*map(_count_decisions, both), strict=True)
     samples = [each.points for each in both]
-    homeless = any(
-        (points.active & ~(_name_places(points) & ((points.master_segment >= 0) | points.weighted))).any()
-        for points in samples
-    )
+    at_home = (_name_places(points) & ((points.master_segment >= 0) | points.weighted) for points in samples)
+    homeless = any((points.active & ~named).any() for points, named in zip(samples, at_home, strict=True))
     n_points = sum(len(points.c) for points in samples)
     return Measurement(
         [WRONG.check(float(sum(wrong)), 0.0)],

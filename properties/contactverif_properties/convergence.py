@@ -26,11 +26,7 @@ from contactverif_properties.states import nearest_sum
 
 
 def _measure_convergence(studies: Studies, case: Case, subject: Subject) -> Measurement:
-    """Solve a study from the finest mesh on, and return the sizes of its errors there, and the rates that are asked.
-
-    The coarser meshes are solved only if a rate is. All errors are kept as series. A number whose errors are not
-    reported is left out.
-    """
+    """Return the sizes of errors on the finest mesh, and the rates that are asked, for which others are solved."""
     study = studies.read(case)
     group, instance = study.group(subject.traits), study.pose(study.meshes[-1], subject.traits)
     last, failure = _solve(studies, instance, subject)
@@ -329,11 +325,8 @@ class _ArcErrors(NamedTuple):
 
 def _errors(arcs: Arcs, refine: int, subject: Subject) -> _ArcErrors:
     case = arcs.case(refine)
-    state, n_slave, slave = (
-        uniform_state(case, subject, arcs.pressure),
-        case.interface.n_slave_nodes,
-        case.interface.slave,
-    )
+    state = uniform_state(case, subject, arcs.pressure)
+    n_slave, slave = case.interface.n_slave_nodes, case.interface.slave
     # Areas of the reference are those of the master's arc, on which the slave lies there.
     share = arcs.radius / arcs.slave_radius if subject.traits.rules.area == "reference" else 1.0
     forces, outwards = pushing_forces(state), case.positions / np.linalg.norm(case.positions, axis=1)[:, None]

@@ -71,24 +71,19 @@ def measure_flat(case: Case, subject: Subject) -> Measurement:
     along = float(np.hypot.reduce(np.abs(np.atleast_1d((slave @ tangents.T).sum(axis=0)))))
     push = float((slave @ exact_forces.normal_of(case)).sum())
     broken, finding = "" if push > along else "nothing pushes the slave out of the master", None
-    if not _states_forces(traits):  # A smoothed master, for one, bulges beside an edge.
+    passes = traits.promises.patch.flat
+    if not (knows_total(traits) if passes is False else passes):  # A smoothed master, for one, bulges beside an edge.
         return Measurement(broken=broken)
     numbers = [ALONG.check(roundoff.ratio(along, float(np.abs(slave).sum())), tolerance)]
     whole = float(np.linalg.norm(exact[: len(slave)].sum(axis=0)))
     if knows_total(traits):
         numbers.append(FLAT_TOTAL.check(abs(push / whole - 1), tolerance))
-    if traits.promises.patch.flat is not False:
+    if passes is not False:
         forces, largest = exact_forces.forces_of_gap(case, subject, exact)
         error = float(np.linalg.norm(forces - exact, axis=1).max())
         numbers.append(FLAT_NODAL.check(error / whole, tolerance * largest))
         finding = exact_forces.worst_force(case.interface, forces, exact) if numbers[-1].ratio > 1 else None
     return Measurement(numbers, broken=broken, finding=finding)
-
-
-def _states_forces(traits: Traits) -> bool:
-    """Return whether the traits promise the patch test, or deny it and state the total."""
-    passes = traits.promises.patch.flat
-    return knows_total(traits) if passes is False else bool(passes)
 
 
 def flat_forces(case: Case) -> FloatArray:
@@ -222,12 +217,10 @@ def _measure_bounded(case: Case, subject: Subject, aside: float = 0.0) -> Measur
     if case.interface.dim == PLANE:  # In space nodal springs of two passes have no such bound.
         numbers.append(SIZE.check(size / (case.penalty * case.diameter * case.slave_length), 4.0))
     tolerance = roundoff.gap_tolerance(case, min(case.parameter("penetration"), case.shortest_segment))
-    if bounds[1] == 0:
-        broken = (
-            f"a force of {size:.2g} on a slave that faces no master"
-            if size > 0
-            else _find_stiffness(state, beside, traits)
-        )
+    if bounds[1] == 0 and size > 0:
+        broken = f"a force of {size:.2g} on a slave that faces no master"
+    elif bounds[1] == 0:
+        broken = _find_stiffness(state, beside, traits)
     else:
         outside = max(0.0, _outside(total, edges) - aside)
         numbers.append(DIRECTION.check(roundoff.ratio(outside, size), tolerance))
@@ -332,15 +325,15 @@ def hard_free_end(case: Case, subject: Subject) -> Measurement:
     **Why it matters.** A body that slides off an edge passes all these states. A master that is continued past its end
     holds it in the air.
 
-    **How it is judged.** How far past an end a point still counts is a choice, such as the option τ. The jump of the
-    force as a point crosses that distance is the force of the point, so it is no more than that of its segment. Hence
-    where `penalty` and `area` are stated, the total is at least ε̂ |g| times the length of the other segments, and at
-    most that of the whole slave. The detail `share of the upper bound` shows the jump: compare the cases 0.0099 and
-    0.0101 past the end for τ = 0.01. A slave wholly outside, by the length of a segment or more, must feel exactly
-    nothing, whatever the formulation. In space that holds from the longest edge of the master on, and nearer the force
-    is no pull, and at most that of the faces beside. Where nothing faces the master, an exact tangent has no entry
-    either, and contact points are asked for: a kernel may not expect that it pairs nothing. The tolerance is
-    u(8X/min(|g|, ℓ) + 4N + 128), in space with D d/h added to X.
+    **How it is judged.** How far past an end a point still counts is a choice, such as the option τ. As a point crosses
+    that distance, the force jumps by no more than that of its segment. Hence where `penalty` and `area` are stated, the
+    total is at least ε̂ |g| times the length of the other segments, and at most that of the whole slave. The detail
+    `share of the upper bound` shows the jump: compare the cases 0.0099 and 0.0101 past the end for τ = 0.01. A slave
+    wholly outside, by the length of a segment or more, must feel exactly nothing, whatever the formulation. In space
+    that holds from the longest edge of the master on, and nearer the force is no pull, and at most that of the faces
+    beside. Where nothing faces the master, an exact tangent has no entry either, and contact points are asked for: a
+    kernel may not expect that it pairs nothing. The tolerance is u(8X/min(|g|, ℓ) + 4N + 128), in space with D d/h
+    added to X.
 
     The force points along the common normal. If forces are the derivative of an energy of what is covered, the end that
     cuts the cover is pushed along the surface by the energy there, ε̂ g²/2 for a length, and of a law of its own at
@@ -501,7 +494,6 @@ def _motions(case: Case) -> tuple[list[FloatArray], FloatArray]:
 
 
 def _measure_patch(case: Case, subject: Subject) -> Measurement:
-    """Return the errors of a flat state (`measure_flat`), or of a solved scene (`measure_once`)."""
     if not has_bodies(case):
         return measure_flat(case, subject)
     measurement, promises = patch_solved.measure_once(case, subject), subject.traits.promises
@@ -689,10 +681,7 @@ NO_FORCE = replace(NO_STRESS, name="force without a load")
 def _check_unloaded(
     quantities: tuple[Quantity, Quantity], case: Case, scene: Scene, q: FloatArray, forces: FloatArray, error: float
 ) -> tuple[CheckedNumber, ...]:
-    """Judge the largest stress at the unknowns q (n_free,) over E of the stiffer body, and the largest force over E H.
-
-    `error` is by how much displacements may be wrong besides the rounding of coordinates, a length.
-    """
+    """Judge the largest stress at q (n_free,) over E, and force over E H; displacements may be wrong by `error`."""
     young, shortest = max(body.young for body in scene.bodies), case.shortest_segment
     height = float(np.ptp(scene.bodies[0].nodes, axis=0).max())
     stress = max(float(np.abs(part).max(initial=0.0)) for part in scene.stresses(q))

@@ -324,14 +324,12 @@ def renumbering(case: Case, subject: Subject) -> Measurement:
 
 
 def _roll_corners(faces: IntArray, random: np.random.Generator) -> IntArray:
-    """Return faces (n_faces, n_corners) that begin at another one of their corners each."""
     places = np.arange(faces.shape[1]) + random.integers(faces.shape[1], size=(len(faces), 1))
     return np.take_along_axis(faces, places % faces.shape[1], axis=1)
 
 
 @random_source("contactverif_properties.remote.remote_cases")
 def _remote_cases(interface: Interface | None = None) -> dict[str, SearchStrategy[Case]] | SearchStrategy[Case] | None:
-    """Return states of any kind, and straight slaves over two bodies; states of a given interface."""
     if interface is not None:
         return smooth_cases(interface)
     behind = cases_over_a_body()
@@ -343,7 +341,6 @@ def _remote_cases(interface: Interface | None = None) -> dict[str, SearchStrateg
 def _remote_surface_cases(
     interface: Interface | None = None, faces: tuple[int, ...] = (TRIANGLE,)
 ) -> dict[str, SearchStrategy[Case]] | None:
-    """Return the same in space; there are none on an interface of the user."""
     far, behind = smooth_surface_cases(interface, faces), plane_cases_by_a_plate(interface, faces)
     return None if far is None or behind is None else {FAR: far, BEHIND: behind}
 

@@ -99,7 +99,6 @@ def measure_jump_of_slope(
 
 
 def _places(state: FrozenState, reach: float, directions: FloatArray) -> list[FloatArray]:
-    """Return the state's unknowns, and those with the nodes moved forth and back in each direction."""
     z = state.case.z
     return [z, *(z + sign * reach * direction for direction in directions for sign in (1, -1))]
 
@@ -139,7 +138,6 @@ def _differentiate(state: FrozenState, z: FloatArray, columns: IntArray | None =
 
 
 def _rounding_share(case: Case) -> float:
-    """Return uX/ℓ, the rounding of a coordinate over the shortest segment."""
     return UNIT_ROUNDOFF * case.largest_coordinate / case.resolution
 
 

@@ -299,10 +299,7 @@ def _fit_steps(
     rate: float = 0.0,
     directions: Sequence[int] = range(N_DIRECTIONS),
 ) -> _Steps:
-    """Take one Newton step from each of some states around the last iterate, the solution, and fit their order.
-
-    A tangent by differences leaves a linear `rate` of convergence at the most.
-    """
+    """Fit the order of single Newton steps around the solution; a tangent by differences leaves a linear `rate`."""
     solution, pairing = trace.u[-1], trace.pairing
     units = scale_factors(matrix, system.scene.n_free)[1]
     floor = solution_floor(system.scene, solution, units, condition)

@@ -393,14 +393,12 @@ def _add_three_normals(
 
 
 def _kink_floor(problem: KinkedPatch, state: Case, gap: float) -> float:
-    """Return T = (g/ℓ) tan(φ/2) (4 + tan(φ/2) tan(φ)/2) + u (8X/g + 4N)."""
     half = problem.sharpest  # With t = tan(φ/2), tan(φ) = 2t/(1 − t²).
     moved = gap / state.shortest_segment * half * (4 + half**2 / (1 - half**2))
     return moved + UNIT_ROUNDOFF * (8 * state.largest_coordinate / gap + 4 * state.n_segments)
 
 
 def _kink_stress_error(problem: KinkedPatch, scene: Scene, q: FloatArray) -> float:
-    """Return the largest entry of σ + p I at the Gauss points over p."""
     exact = np.array([-problem.pressure, -problem.pressure, 0.0])
     return max(float(np.abs(stresses - exact).max()) for stresses in scene.stresses(q)) / problem.pressure
 

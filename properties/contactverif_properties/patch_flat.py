@@ -86,14 +86,13 @@ def patch_flat_transmission(case: Case, subject: Subject) -> Measurement:
     and in space the largest |F − F_exact| over the largest exact force on a node. On quadrilaterals that are no
     parallelograms shape functions are no polynomials, and no rule on overlaps gives the exact forces. Whatever the
     rule, ΣF and ΣF x are exact there on either side, over ε̂ |g| A and the size of the domain; nodal forces may err by
-    1e-2, which a rule of degree 2 on cells keeps at all angles.
-    The exact forces are computed in rationals, by code that plugins cannot use. The tolerance is u(8X/|g| + 4N + 128):
-    a gap is a difference of coordinates, each rounded to uX, N forces are summed, and weights of integration are known
-    to 1e-14. X stands here for every formulation, because the state is turned and moved, and stored as it is rounded;
-    `stability.local` asks on states that are exact.
-    With multipliers only the distribution of the forces is judged, and not their size: of uniform multipliers if they
-    are pressures, and of those that come nearest to the exact forces if they are nodal forces. Of a barrier, whose
-    slave is lifted to a uniform gap, the distribution is judged, too.
+    1e-2, which a rule of degree 2 on cells keeps at all angles. The exact forces are computed in rationals. The
+    tolerance is u(8X/|g| + 4N + 128): a gap is a difference of coordinates, each rounded to uX, N forces are summed,
+    and weights of integration are known to 1e-14. X stands here for every formulation, because the state is turned and
+    moved, and stored as it is rounded; `stability.local` asks on states that are exact. With multipliers only the
+    distribution of the forces is judged, and not their size: of uniform multipliers if they are pressures, and of those
+    that come nearest to the exact forces if they are nodal forces. Of a barrier, whose slave is lifted to a uniform
+    gap, the distribution is judged, too.
 
     **Undecided.** A failing case is undecided where a slave node faces a free end of the master exactly, the error is
     at most X/ℓ times the tolerance, and it is gone with that node a rounding further inside. Mortar integrals of the
@@ -486,17 +485,14 @@ STEEPEST_SEEN = 0.5  # The cosine of 60°, up to which half passes see a slave, 
 
 @random_source("contactverif_properties.straight_slaves.resultant_cases")
 def _resultant_cases(interface: Interface | None = None) -> dict[str, SearchStrategy[Case]] | None:
-    """Return {kind: strategy} of tilted, steep and nearly parallel slaves; None for a given mesh."""
     makers = {TILTED: tilted_cases, STEEP: steep_cases, SLIGHT: slight_cases}
-    kinds = {kind: cases for kind, make in makers.items() if (cases := make(interface)) is not None}
-    return kinds or None
+    return {kind: cases for kind, make in makers.items() if (cases := make(interface)) is not None} or None
 
 
 @random_source("contactverif_properties.straight_slaves.resultant_plane_cases")
 def _resultant_plane_cases(
     interface: Interface | None = None, faces: tuple[int, ...] = (TRIANGLE,)
 ) -> dict[str, SearchStrategy[Case]] | None:
-    """Return the same in space."""
     tilted, steep = tilted_plane_cases(interface, faces), steep_plane_cases(interface, faces)
     return {TILTED_PLANE: tilted, STEEP_PLANE: steep} if tilted is not None and steep is not None else None
 
@@ -534,12 +530,11 @@ def patch_tilted_resultant(case: Case, subject: Subject) -> Measurement:
     the direction alone. The tolerance is u(8Z/|g| + 4N + 128), where Z is the diameter of a formulation that promises
     `translation_stable`, and the largest coordinate of any other.
 
-    In a third of the cases in the plane the tilt is 2^-45 to 2^-5, each octave as likely as another: what looks
-    parallel is not. In a third it is 35° to 89°, in half of those in space 14° to 89°, and no coordinate is rounded.
-    Gaps along the slave's normal are up to 57 times those along the master's there, and yet no longer than two master
-    segments, so that every search finds them. A formulation that states no rule `gap` may overlook a slave that is
-    steeper than 60°, in space 14°, and give no force at all. Else its total is no more than with gaps along the slave's
-    normal, and no less than with those along the master's, unless the slave is so steep: all others lie between.
+    In a third of the cases in the plane the tilt is 2^-45 to 2^-5, in a third 35° to 89°, and in half of those in space
+    14° to 89°. No coordinate is rounded, and no gap is longer than two master segments, so that every search finds it.
+    A formulation that states no rule `gap` may overlook a slave that is steeper than 60°, in space 14°. Else its total
+    is no more than with gaps along the slave's normal, and no less than with those along the master's, unless the slave
+    is so steep.
 
     **Undecided.** A failing case is undecided where the state lies at a kink, or where moving the nodes by 64 u X
     changes the answer by a quarter of the error or more.

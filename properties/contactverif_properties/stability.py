@@ -197,7 +197,6 @@ def _errors_of_uniform(case: Case, traits: Traits, forces: FloatArray) -> dict[Q
 
 
 def _errors_of_linear(case: Case, traits: Traits, forces: FloatArray) -> dict[Quantity, FloatArray]:
-    """Return the same under a linear penetration, of the rows of slave nodes."""
     if traits.rules.enforcement != "penalty" or not exact_forces.knows_linear_total(traits):
         return {}
     n_slave = case.interface.n_slave_nodes

@@ -176,7 +176,6 @@ def _roundoff(case: Case, dtype: type) -> float:
 
 
 def _stated_error(case: Case, traits: Traits) -> float:
-    """Return δ max(S/ℓ, 1) for the error δ that the traits state of a tangent by differences."""
     return tangent_error(traits) * max(_roundoff(case, np.float64) / UNIT_ROUNDOFF, 1.0)
 
 
@@ -241,7 +240,6 @@ class _Comparison:
 
 
 def _over(errors: FloatArray, sizes: FloatArray) -> FloatArray:
-    """Return errors ≥ 0 over sizes; 0/0 counts as 0."""
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.where(errors > 0, errors / sizes, 0.0)
 
