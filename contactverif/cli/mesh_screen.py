@@ -63,7 +63,6 @@ def show_mesh(path: Path) -> None:
 
 
 def _labels(labels: IntArray, parts: Iterable[IntArray]) -> list[int]:
-    """Return the labels of the first nodes of some cells, in their order."""
     return [int(label) for part in parts for label in labels[part[:, 0]]]
 
 

@@ -143,7 +143,10 @@ class PluginProcess:
             if [reply.question for reply in replies] != [question.number for question in questions]:
                 raise MessageError("answers to other questions")
         except (TooLateError, ClosedError, TooLargeError, MessageError) as error:
-            raise self._end_with(self._last_verb(questions), error) from None
+            # A file that is read cannot do harm. One that is mapped into memory can: the plugin may cut it.
+            number = (os.pread(self._progress.fileno(), 1, 0) or b"\0")[0]
+            verb = questions[min(number, len(questions) - 1)].verb if questions else "make"
+            raise self._end_with(verb, error) from None
         except BaseException:
             self.end()
             raise
@@ -162,11 +165,6 @@ class PluginProcess:
                 clock = clock or ActiveClock(self._child.pid)
                 clock.look()
         raise TooLateError(f"no answer within {seconds:g} s: an endless loop? (--time-limit)")
-
-    def _last_verb(self, questions: Sequence[Question]) -> str:
-        # A file that is read cannot do harm. One that is mapped into memory can: the plugin may cut it.
-        number = (os.pread(self._progress.fileno(), 1, 0) or b"\0")[0]
-        return questions[min(number, len(questions) - 1)].verb if questions else "make"
 
     @property
     def code_files(self) -> list[Path]:

@@ -175,7 +175,7 @@ def total_ratio(cost: Cost, reference: Cost, share: float) -> Ratio:
 
 
 def runtimes(results: BenchResults, formulation: str, scene: str, number: str) -> FloatArray:
-    """Return seconds (n,) of all evaluations, or factorisations, to each target on each instance; infinite if not."""
+    """Return the seconds (n,) of evaluations or factorisations to each target on each instance, infinite if missed."""
     parts = []
     for target in results.targets[scene]:
         cost = cost_of(results, formulation, scene, target)

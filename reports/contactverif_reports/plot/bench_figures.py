@@ -60,7 +60,6 @@ def highlights(results: BenchResults) -> dict[str, dict[str, Any]]:
 
 
 def _panels(size: tuple[float, float], rows: int, columns: int, **options: Any) -> tuple[Figure, Any]:
-    """Return a figure and its panels (rows, columns), with a faint grid."""
     figure = Figure(figsize=size, layout="constrained")
     panels = figure.subplots(rows, columns, squeeze=False, **options)
     for axes in panels.flat:
@@ -106,7 +105,6 @@ def make_scene_figure(results: BenchResults, scene: str) -> Figure:
 
 
 def _add_legend(figure: Figure, looks: Mapping[str, Mapping[str, Any]]) -> None:
-    """Say above the panels what each curve is."""
     handles = [Line2D([], [], label=label, **{"mfc": "none", **look}) for label, look in looks.items()]
     figure.legend(handles=handles, loc="outside upper center", ncols=2)
 
