@@ -9,7 +9,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from contactverif.contract.arrays import FloatArray, IntArray
+from contactverif.contract.arrays import FloatArray
 from contactverif.contract.subject import Subject
 from contactverif.diagnosis.flat_state import (
     COARSE,
@@ -89,7 +89,9 @@ def _uniform_patterns(state: FlatState, forces: FloatArray, in_full: bool) -> It
         yield "there is no force at all where the surfaces penetrate"
     if same(pushes, state.exact):
         return
-    yield from _plain_patterns(state, pushes)
+    yield _segment_pattern(state, pushes, 0)
+    yield _segment_pattern(state, pushes, 1)
+    yield _exchange(state, pushes, 1)
     if in_full:
         yield from _patterns_of_pieces(state, pushes)
     if same(pushes[:n], np.full(n, PENALTY * DEPTH)):
@@ -97,12 +99,6 @@ def _uniform_patterns(state: FlatState, forces: FloatArray, in_full: bool) -> It
         yield f"each slave node has a whole spring, ε̂ |g|: {nodal}; else the length at the node is missing"
     if in_full:
         yield _side_pattern(state, pushes)
-
-
-def _plain_patterns(state: FlatState, pushes: FloatArray) -> Iterator[str]:
-    yield _segment_pattern(state, pushes, 0)
-    yield _segment_pattern(state, pushes, 1)
-    yield _exchange(state, pushes, 1)
 
 
 def _patterns_of_pieces(state: FlatState, pushes: FloatArray) -> Iterator[str]:
@@ -151,18 +147,12 @@ def _exchange(state: FlatState, pushes: FloatArray, side: int) -> str:
     return "the two shape functions of each slave segment are exchanged: a node has what belongs to its neighbour"
 
 
-def _segment_factors(state: FlatState, pushes: FloatArray, side: int) -> tuple[IntArray, FloatArray | None]:
-    """Return the segments of a side, and the factors of their parts whose sum the forces are; None if they are none."""
-    numbers, pieces = state.segments[side], state.pieces
-    segments = np.unique(numbers)
-    parts = np.stack([pieces[numbers == segment].sum(axis=0) for segment in segments], axis=1)
-    factors: FloatArray = np.linalg.lstsq(parts, pushes, rcond=None)[0]
-    return segments, factors if same(parts @ factors, pushes) else None
-
-
 def _segment_pattern(state: FlatState, pushes: FloatArray, side: int) -> str:
-    segments, factors = _segment_factors(state, pushes, side)
-    if factors is None or (wrong := ~equal(factors, np.ones(len(factors)))).all():
+    numbers = state.segments[side]
+    segments = np.unique(numbers)
+    parts = np.stack([state.pieces[numbers == segment].sum(axis=0) for segment in segments], axis=1)
+    factors: FloatArray = np.linalg.lstsq(parts, pushes, rcond=None)[0]
+    if not same(parts @ factors, pushes) or (wrong := ~equal(factors, np.ones(len(factors)))).all():
         return ""
     name = ("slave", "master")[side]
     missed = [int(segment) for segment, factor in zip(segments, factors, strict=True) if abs(factor) < SAME]
