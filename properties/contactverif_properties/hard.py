@@ -178,7 +178,7 @@ def hard_search(case: Case, subject: Subject) -> Measurement:
     **Question.** The slave lies on a flat part of the master. Something else is near: a node that is nearer than those
     of the right segment, the other side of a thin plate or of a sharp wedge, a second body behind the first, the place
     where a closed chain begins, or the other sides of a hole, numbered from each of its nodes. In space there are also
-    264 or 4050 faces, numbered at random. Are the forces those of the flat part alone?
+    264 or 4050 triangles, numbered at random. Are the forces those of the flat part alone?
 
     **Why it matters.** These are the named failures of projection in the manuals of contact codes. A search that starts
     from the nearest node ends on the wrong side of a plate, and pulls where it should push. A hole is walked clockwise;

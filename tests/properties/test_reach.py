@@ -15,7 +15,7 @@ from contactverif.problems.flat_states import deep_face_states, deep_states
 from contactverif.run.run import run
 
 DEPTH = 0.5  # Each looks so far behind the segment in hand, in its own lengths.
-POINTS = {"patch.tilted.resultant", "patch.tilted.nodal", "projection.activity"}
+POINTS = {"hard.deep", "patch.tilted.resultant", "patch.tilted.nodal", "projection.activity"}
 STRIPS = {"patch.flat.transmission", "patch.flat.single", "accuracy.arc", "hard.deep", "continuity"}
 
 
