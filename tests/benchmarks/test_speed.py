@@ -17,6 +17,7 @@ from plain_skfem import solve as plain
 from scipy import sparse
 from scipy.sparse.linalg import splu
 from subjects import load_property, load_subject, plane_names
+from zoo.at_points import LogBarrier
 
 import contactverif
 from contactverif import Case, Interface, Property, Rectangle, Run, Scene, Subject, Verdict, evaluate_both, judge_case
@@ -154,7 +155,8 @@ def cases_of(question: Property, count: int) -> tuple[Call, tuple[Case, ...] | A
 def one_case(property_id: str) -> Racers:
     """Judge the last random case, since the first are the simplest, or the first of a list."""
     question = load_property(property_id)
-    subjects = [each for each in map(load_subject, FORMULATIONS) if not question.refusal_of(each)]
+    every = *map(load_subject, FORMULATIONS), Subject("barrier", LogBarrier)
+    subjects = [each for each in every if not question.refusal_of(each)]
     subject = next(each for each in subjects if question.needs <= each.provides)
     draw, source, _ = cases_of(question, N_JUDGED)
     case = draw().cases[0 if isinstance(source, tuple) else -1]

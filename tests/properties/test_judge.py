@@ -73,6 +73,7 @@ def test_states_that_penetrate_are_not_for_barriers() -> None:
         rules=Rules(gap="closest point", penalty="distributed", area="current"),
     )
     traits = traits.revise(published_forces={"a1": "1 2 1; 2 2"}, force_along="master normal", continuity="C0")
+    traits = traits.revise(gap_shapes="standard", pressure_shapes="standard", opens_at_ends=True)
     nodal = "patch.flat.nodal"
     springs_alone = (
         nodal,

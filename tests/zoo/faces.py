@@ -434,6 +434,7 @@ def _stiffen(*, penalty):
 
 
 add("springs a twentieth too stiff, of an unstated area", "total-stiffness", _stiffen)
+add("gaps weighted with other shapes than stated", "patch.tilted.weighted", says(MORTAR, gap_shapes="dual"))
 add("penalty in single precision", "hard.deep", lambda *, penalty: wrap(float(np.float32(penalty)), STS))
 
 
