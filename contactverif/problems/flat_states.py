@@ -330,7 +330,6 @@ class Sheet:
     faces: Faces
 
     def __add__(self, other: "Sheet") -> "Sheet":
-        """Return both, which have no node in common."""
         moved = [[node + len(self.points) for node in face] for face in other.faces]
         return Sheet([*self.points, *other.points], [*self.faces, *moved])
 

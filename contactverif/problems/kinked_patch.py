@@ -112,7 +112,6 @@ def exact_unknowns(problem: KinkedPatch, scene: Scene, penetration: float) -> Fl
 
 
 def _block(problem: KinkedPatch, *, upper: bool, start: FloatArray) -> Body:
-    """Return one block, its nodes row by row from bottom to top."""
     line, shares = np.array(problem.line), np.array(UPPER if upper else LOWER)
     parts = line[:-1, None] + shares[1:, None] * np.diff(line, axis=0)[:, None]  # (n_facets, n_nodes, 2)
     parts[:, -1] = line[1:]  # A kink is the same point to the last bit on both sides.

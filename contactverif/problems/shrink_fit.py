@@ -330,7 +330,6 @@ FIT = ShrinkFit(interference=1e-2)  # The interference is larger than the height
 
 
 def _pose(segments: int, stiffness: float, traits: Traits, variation: Variation) -> ProblemInstance:
-    """Return the problem with about so many segments along the inner ring."""
     problem = replace(FIT, interference=FIT.interference * variation.load)
     refine = segments * variation.size / SEGMENTS["inner"]
     penalty = stiffness * min(problem.young) * SEGMENTS["inner"] * refine / (pi / 2 * problem.radius)

@@ -43,7 +43,7 @@ _define = partial(
 
 @_define(
     id="balance.force",
-    rank=280,
+    rank=295,
     role="exact",
     turn=0,
     quantities=(FORCE_IMBALANCE,),
@@ -78,7 +78,7 @@ def force_balance(case: Case, subject: Subject) -> Measurement:
 
 @_define(
     id="balance.moment",
-    rank=230,
+    rank=245,
     role="exact",
     turn=1,
     quantities=(MOMENT_IMBALANCE,),

@@ -358,7 +358,7 @@ def _growth(pushes: list[float]) -> list[float]:
 
 @Property.define(
     id="intersection-free",
-    rank=445,
+    rank=33,
     family="invariants",
     quantities=(GROWTH, WORK, JUMP),
     cases=Cases.random(closing_cases),
@@ -436,7 +436,7 @@ def _pull_of_points(state: FrozenState) -> tuple[float, float] | None:
 
 @_define(
     id="nodal-push",
-    rank=110,
+    rank=135,
     turn=4,
     quantities=(PULL_OF_NODE,),
     promise=lambda traits: traits.promises.nodes_push,
@@ -593,7 +593,7 @@ def _allow_points(each: Pass, normals: dict[int, set[Direction]], allowance: Flo
 @Property.define(
     id="unilateral.overhang",
     family="invariants",
-    rank=65,
+    rank=323,
     role="trait",
     quantities=(OPEN,),
     cases=Cases.random(open_end_cases),

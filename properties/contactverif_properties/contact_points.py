@@ -336,7 +336,7 @@ POSITION = Quantity("error of the position", "4u", "Two products and their sum a
 _ROUNDINGS = {GAP: 4, XI: 4, NORMAL: 8, POSITION: 4}
 
 
-@_define(id="projection.place", rank=70, quantities=(GAP, XI, NORMAL, POSITION), applicable=_refuse_without_rule)
+@_define(id="projection.place", rank=85, quantities=(GAP, XI, NORMAL, POSITION), applicable=_refuse_without_rule)
 def projection_place(case: Case, subject: Subject) -> Measurement:
     """Position, ξ, normal and gap of each contact point are those of its place.
 

@@ -133,7 +133,7 @@ def hard_offset(case: Case, subject: Subject) -> Measurement:
     return measure_flat(case, subject)
 
 
-@_define_flat(id="hard.deep", rank=380, plane=flat_states.deep_states, space=flat_states.deep_face_states)
+@_define_flat(id="hard.deep", rank=405, plane=flat_states.deep_states, space=flat_states.deep_face_states)
 def hard_deep(case: Case, subject: Subject) -> Measurement:
     """A penetration of half a segment or two segments gives the forces of that penetration.
 

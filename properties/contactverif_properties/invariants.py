@@ -352,7 +352,7 @@ def _refuse_shortest_segment(traits: Traits) -> str:
 
 @_define(
     id="remote",
-    rank=190,
+    rank=137,
     role="comparison",
     quantities=_same_answer("beside another body"),
     cases=Cases.random(_remote_cases),
@@ -568,7 +568,7 @@ def _turn_state(case: Case) -> tuple[Case, FloatArray]:
 
 @_define(
     id="objectivity",
-    rank=100,
+    rank=132,
     role="comparison",
     turn=7,
     quantities=(TURNED_FORCES, TURNED_TANGENT),

@@ -97,7 +97,7 @@ def _promise_mean(traits: Traits) -> bool | None:
 
 @Property.define(
     id="patch.curved",
-    rank=470,
+    rank=485,
     quantities=(SLAVE_MEAN, MASTER_MEAN, REPORTED, BESIDE, BARE_NODES),
     cases=Cases.from_list(_rings),
     linear=LINEAR_FORCES,

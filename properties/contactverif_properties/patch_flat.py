@@ -212,7 +212,7 @@ _define_class = partial(_define_uniform, quantities=(FORCE, GAP, PRESSURE))
 
 @_define_class(
     id="patch.flat.normal",
-    rank=160,
+    rank=175,
     turn=3,
     cases=Cases.random(normal_cases),
     cases_in_space=Cases.random(surfaces.matched_surface_cases),
@@ -407,7 +407,7 @@ PUSH = Quantity(
 
 @Property.define(
     id="total-stiffness",
-    rank=350,
+    rank=326,
     family="patch",
     quantities=(MOST, LEAST, PUSH),
     cases=Cases.from_list(equal_length_states),
@@ -573,7 +573,7 @@ def _refuse_unknown_integral(traits: Traits) -> str:
 
 @Property.define(
     id="patch.tilted.nodal",
-    rank=370,
+    rank=395,
     role="trait",
     quantities=(TILTED_NODAL,),
     cases=Cases.random(tilted_cases),
@@ -612,7 +612,7 @@ def _refuse_unknown_shapes(traits: Traits) -> str:
 
 @Property.define(
     id="patch.tilted.weighted",
-    rank=375,
+    rank=36,
     quantities=(TILTED_NODAL, TILTED_ROW),
     cases=Cases.random(tilted_cases),
     cases_in_space=Cases.random(tilted_plane_cases),

@@ -370,7 +370,7 @@ _define_at_two_penalties = partial(_define, quantities=(*QUANTITIES, *map(_at_hi
 
 
 @_define_at_two_penalties(
-    id="patch.flat.solve", rank=660, cases=Cases.random(block_cases), promise=lambda traits: traits.promises.patch.flat
+    id="patch.flat.solve", rank=675, cases=Cases.random(block_cases), promise=lambda traits: traits.promises.patch.flat
 )
 def patch_flat_solve(case: Case, subject: Subject) -> Measurement:
     """Two elastic blocks under a uniform pressure find the exact stress, forces and gap at two penalties.
@@ -399,7 +399,7 @@ def patch_flat_solve(case: Case, subject: Subject) -> Measurement:
 
 @_define_at_two_penalties(
     id="patch.flat.normal.solve",
-    rank=590,
+    rank=605,
     cases=_scenes_of_class(normal_scenes, midpoints=False),
     promise=promise_normal,
 )
