@@ -124,7 +124,9 @@ def test_a_property_without_a_mutant_of_its_own_has_a_reason() -> None:
 
 
 def test_most_counterexamples_have_a_segment_a_side_and_none_is_large() -> None:
-    sizes = {row["mutant"]: size_of(row)[0] for row in read("smallest_cases.csv")}
+    # What closes on a vertex has three segments at least.
+    rows = [row for row in read("smallest_cases.csv") if row["caught by"] != "intersection-free"]
+    sizes = {row["mutant"]: size_of(row)[0] for row in rows}
     for mutant, n_segments in LARGE.items():
         assert sizes.pop(mutant) == n_segments
     assert len(sizes) >= 180
