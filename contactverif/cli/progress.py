@@ -68,7 +68,6 @@ class Bar:
         self._previous_handlers: dict[int, Any] = {}
 
     def __enter__(self) -> Bar:
-        stop_signals.clear()
         if threading.current_thread() is threading.main_thread():  # Python allows signal handlers in no other thread.
             for number in (signal.SIGINT, signal.SIGTERM):
                 self._previous_handlers[number] = signal.signal(number, self._interrupt)
@@ -81,6 +80,7 @@ class Bar:
             self._progress.stop()
         for number, handler in self._previous_handlers.items():
             signal.signal(number, handler)
+        stop_signals.clear()  # What is asked for the screen of a stopped run goes on.
 
     def _interrupt(self, number: int, frame: FrameType | None) -> None:
         stop_signals.append(number)

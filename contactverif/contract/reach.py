@@ -6,7 +6,7 @@ from contactverif.contract.arrays import FloatArray
 from contactverif.contract.interface import PLANE, Interface
 
 _AT_ONCE = 256  # Points that are compared with all master faces at once, so that memory stays small.
-_TIED = 1 + 1e-9  # Two faces are equally near if their distances differ by less.
+_TIED = 1 + 1e-9  # Faces are equally near if distances differ by less: far more than rounding, far less than a mesh.
 
 
 def find_depth(interface: Interface, positions: FloatArray) -> float:

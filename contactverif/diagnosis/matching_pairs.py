@@ -17,7 +17,7 @@ from contactverif.contract.interface import PLANE, SEGMENT, SPACE, TRIANGLE, Int
 from contactverif.contract.subject import Subject
 from contactverif.diagnosis.flat_state import DEPTH, PENALTY, SAME, residual_of, same
 
-MEANINGS = {  # {factor: what it may mean}
+_MEANINGS = {  # {factor: what it may mean}
     2.0: "two passes that each have the whole penalty, or a factor 2",
     0.5: "a factor ½, such as a mean of two sides that is taken once too often",
     -1.0: "the sign",
@@ -84,7 +84,7 @@ def _patterns(subject: Subject, corners: int) -> Iterator[str]:
     factors = _fit(forces, [[right] for right in exact])
     # Two passes are right with twice the force.
     if factors is not None and not (subject.traits.promises.unbiased and abs(factors[0] - 2.0) <= SAME):
-        near = [f": {words}" for known, words in MEANINGS.items() if abs(factors[0] - known) <= SAME]
+        near = [f": {words}" for known, words in _MEANINGS.items() if abs(factors[0] - known) <= SAME]
         yield f"every node has {factors[0]:.4g} times the exact force{''.join(near)}"
     of_slave = [right * pair.is_slave for pair, right in zip(pairs, exact, strict=True)]
     of_master = [right - part for right, part in zip(exact, of_slave, strict=True)]

@@ -32,9 +32,9 @@ def tangent_error(traits: Traits) -> float:
     return traits.promises.tangent if isinstance(traits.promises.tangent, int | float) else 0.0
 
 
-def refuse_unstated(traits: Traits, *names: str) -> str:
-    """Return which of these rules the traits have to state, in words that a screen collects, or an empty string."""
-    missing = ", ".join(f"rules.{name}" for name in names if getattr(traits.rules, name) is None)
+def refuse_unstated(traits: Traits, *names: str, group: str = "rules") -> str:
+    """Return which traits of a group have to be stated, in words that a screen collects, or an empty string."""
+    missing = ", ".join(f"{group}.{name}" for name in names if getattr(getattr(traits, group), name) is None)
     return f"state {missing} to be asked" if missing else ""
 
 

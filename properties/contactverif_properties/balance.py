@@ -18,7 +18,7 @@ from contactverif.strategies import smooth_cases
 from contactverif.strategies.surfaces import smooth_surface_cases, surface_cases
 from contactverif.strategies.translations import sliding_cases
 from contactverif_properties import roundoff
-from contactverif_properties.applicability import tangent_error
+from contactverif_properties.applicability import refuse_unstated, tangent_error
 from contactverif_properties.exact_forces import COMPONENTS
 from contactverif_properties.kinks import excuse_barrier, find_kink, measure_jump
 from contactverif_properties.roundoff import ratio, rounding_distance, segment_tolerance, sum_larger_forces
@@ -226,7 +226,7 @@ Function = Callable[[FloatArray], FloatArray]
 def _refuse_unstated_continuity(traits: Traits) -> str:
     if traits.rules.enforcement == "multiplier":
         return "multipliers would change on the way, and here nothing is solved"
-    return "state promises.continuity to be asked" if traits.promises.continuity is None else ""
+    return refuse_unstated(traits, "continuity", group="promises")
 
 
 @Property.define(

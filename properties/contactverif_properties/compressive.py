@@ -28,7 +28,7 @@ from contactverif.strategies.closings import KINDS, closing_cases
 from contactverif.strategies.straight import open_end_cases
 from contactverif.strategies.surfaces import flat_surface_cases, surface_cases
 from contactverif_properties import roundoff
-from contactverif_properties.applicability import may_act_twice
+from contactverif_properties.applicability import may_act_twice, refuse_unstated
 from contactverif_properties.exact_forces import describe_node, normal_of, unit_forces, worst_force
 from contactverif_properties.roundoff import COORDINATE_ROUNDING
 from contactverif_properties.states import FrozenState, Pass, freeze_state, prepare_state, random_moves
@@ -364,7 +364,7 @@ def _growth(pushes: list[float]) -> list[float]:
     cases=Cases.random(closing_cases),
     kinds=KINDS,
     promise=lambda traits: traits.promises.never_intersects,
-    applicable=lambda traits: "" if traits.promises.never_intersects is not None else "state `never_intersects`",
+    applicable=lambda traits: refuse_unstated(traits, "never_intersects", group="promises"),
     asks=frozenset({"barrier"}),
 )
 def intersection_free(case: Case, subject: Subject) -> Measurement:
@@ -598,7 +598,7 @@ def _allow_points(each: Pass, normals: dict[int, set[Direction]], allowance: Flo
     quantities=(OPEN,),
     cases=Cases.random(open_end_cases),
     promise=lambda traits: traits.promises.opens_at_ends,
-    applicable=lambda traits: "" if traits.promises.opens_at_ends is not None else "state promises.opens_at_ends",
+    applicable=lambda traits: refuse_unstated(traits, "opens_at_ends", group="promises"),
 )
 def unilateral_overhang(case: Case, subject: Subject) -> Measurement:
     """No force acts across an open gap where one surface ends under a segment of the other.

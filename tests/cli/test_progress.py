@@ -11,6 +11,7 @@ from contactverif.cli import progress
 from contactverif.cli.progress import Bar
 from contactverif.contract.property import Verdict
 from contactverif.contract.result import Row
+from contactverif.isolation.process import stop_signals
 from contactverif.run.scheduler import Progress, RunProgress
 
 
@@ -89,6 +90,7 @@ def test_an_interrupt_that_python_drops_ends_the_run_at_the_next_case() -> None:
         with pytest.raises(KeyboardInterrupt):
             bar.update("two", 1, 3)
     assert signal.getsignal(signal.SIGINT) is before
+    assert not stop_signals  # The screen of the stopped run may ask a plugin.
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
