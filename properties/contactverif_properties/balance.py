@@ -21,7 +21,7 @@ from contactverif_properties import roundoff
 from contactverif_properties.applicability import refuse_unstated, tangent_error
 from contactverif_properties.exact_forces import COMPONENTS
 from contactverif_properties.kinks import excuse_barrier, find_kink, measure_jump
-from contactverif_properties.roundoff import ratio, rounding_distance, segment_tolerance, sum_larger_forces
+from contactverif_properties.roundoff import ratio, segment_tolerance, sum_larger_forces
 from contactverif_properties.states import FrozenState, any_cases, freeze_state, random_directions
 
 FORCE_IMBALANCE = roundoff.stated_gap_quantity("force imbalance")
@@ -32,7 +32,9 @@ N_POINTS = 16  # Points on a loop: the error of the trapezoidal rule falls like 
 RADII = (2.0**-10, 2.0**-15, 2.0**-20)
 ASYMMETRY = Quantity("asymmetry of the tangent", "u(8Z/min(g, ℓ) + 4N)", roundoff.SEGMENT_REASON)
 WORK = Quantity(
-    "work in a closed loop", "64 u Z/r", "Positions are rounded to uZ, and forces change with them over the radius r."
+    "work in a closed loop",
+    "64 u X/r",
+    "Moved positions are rounded to uX, and forces change with them over the radius r.",
 )
 
 
@@ -141,8 +143,8 @@ def symmetric(case: Case, subject: Subject) -> Measurement:
     tolerance is u(8Z/min(g, ℓ) + 4N), and 2 δ max(X/ℓ, 1) more of a stated error δ. The second is the work in a closed
     loop over the sum of the works on its parts. The loops are three circles with a radius of r = 2^-10 ℓ in random
     planes of all unknowns, and the trapezoidal rule with 16 points is exact to roundoff there. The tolerance is 64 u
-    Z/r: positions are rounded to uZ, and forces change over r. A formulation that says that its tangent is approximate
-    is asked for the matrix alone.
+    X/r: the harness rounds the moved positions to uX, and forces change over r. A formulation that says that its
+    tangent is approximate is asked for the matrix alone.
 
     Without a pairing, a loop in which work is left and that may cross a kink is followed by one with r = 2^-15 ℓ, then
     by one with 2^-20 ℓ; those of a barrier are too, since its forces bend where they begin. Kinks are looked for at √2
@@ -152,20 +154,21 @@ def symmetric(case: Case, subject: Subject) -> Measurement:
     than the smallest r. Otherwise never: on a frozen pairing there are no kinks.
     """
     state = freeze_state(case, subject)
-    case, distance = state.case, roundoff.rounding_distance(state.case, subject.traits)
+    case = state.case
     values, tolerances, undecided = {}, {}, ""
     if "tangent" in subject.provides:
         tangent = state.tangent
         values[ASYMMETRY] = roundoff.ratio(float(np.abs(tangent - tangent.T).max()), float(np.abs(tangent).max()))
         stated = 2 * tangent_error(subject.traits) * max(case.largest_coordinate / case.resolution, 1.0)
+        distance = roundoff.rounding_distance(case, subject.traits)
         tolerances[ASYMMETRY] = roundoff.segment_tolerance(case, state.residual, distance) + stated
     if subject.traits.promises.tangent != "approximate":
-        values[WORK], tolerances[WORK], undecided = _find_work(state, subject, distance)
+        values[WORK], tolerances[WORK], undecided = _find_work(state, subject)
     measurement = Measurement(check_all(values, tolerances), undecided, idle=not state.forces.any())
     return measurement.after(f"moved round circles of radius {RADII[0] * case.resolution:.2g} or less", WORK)
 
 
-def _find_work(state: FrozenState, subject: Subject, distance: float) -> tuple[float, float, str]:
+def _find_work(state: FrozenState, subject: Subject) -> tuple[float, float, str]:
     """Return the work in closed loops, its tolerance, and why work that is left decides nothing."""
     # A barrier begins with a jump in the curvature of its forces, which a loop may cross on a frozen pairing, too.
     is_barrier = subject.traits.rules.enforcement == "barrier"
@@ -173,7 +176,8 @@ def _find_work(state: FrozenState, subject: Subject, distance: float) -> tuple[f
     work, tolerance, undecided = 0.0, 0.0, ""
     for share in RADII[:1] if steady else RADII:
         radius = share * state.case.resolution
-        work, tolerance, undecided = _largest_work(state, radius), 64 * UNIT_ROUNDOFF * distance / radius, ""
+        work, undecided = _largest_work(state, radius), ""
+        tolerance = 64 * UNIT_ROUNDOFF * state.case.largest_coordinate / radius
         if work <= tolerance or steady:
             break
         directions = random_directions(state.case.seed, 2 * N_LOOPS, state.case.z.size)
@@ -212,12 +216,12 @@ ALLOWED, ALLOWED_OF_SLOPE = 2.0**-12, 2.0**-10  # Shares of the largest change o
 DIFFERENCE = 2.0**-26  # The step of the central difference along the way.
 FORCE = Quantity(
     "jump of a force",
-    "2^-12 Δ + u(8Z/min(g, ℓ) + 4N)",
+    "2^-12 Δ + u(8X/min(g, ℓ) + 4N)",
     "After 20 halvings, a continuous force changes by 2^-20 of its change Δ over a step, and by roundoff.",
 )
 SLOPE = Quantity(
     "jump of a slope",
-    "2^-10 Δ + 2^26 u(8Z/min(g, ℓ) + 4N)",
+    "2^-10 Δ + 2^26 u(8X/min(g, ℓ) + 4N)",
     "After 16 halvings, a continuous slope changes by 2^-16 of its change Δ over a step; differences raise roundoff.",
 )
 Function = Callable[[FloatArray], FloatArray]
@@ -251,7 +255,7 @@ def continuity(case: Case, subject: Subject) -> Measurement:
     **How it is judged.** The forces are computed after each of 12 steps of the way. The step that differs most from its
     neighbours is halved 20 times, always towards the larger change. A continuous force then changes by about 2^-20 of
     the step's change, and a jump is left as it is. The first number is the largest change of a force that is left, over
-    Σ|R| of the slave. The tolerance is 2^-12 of the largest change over a step, plus u(8Z/min(g, ℓ) + 4N). A
+    Σ|R| of the slave. The tolerance is 2^-12 of the largest change over a step, plus u(8X/min(g, ℓ) + 4N). A
     formulation that promises C1 is asked the same about the derivative along the way, a central difference on the
     frozen pairing: the step is halved 16 times, the tolerance is 2^-10 of the largest change plus 2^26 times that
     roundoff, and the unit is the largest derivative. The details say where the largest jump is (0 to 1), and how many
@@ -282,7 +286,7 @@ def continuity(case: Case, subject: Subject) -> Measurement:
     samples = forces(PLACES)
     size = max(sum_larger_forces(case, sample) for sample in samples)
     largest = samples[int(np.abs(samples).sum(axis=1).argmax())]
-    rounding = segment_tolerance(case, largest, rounding_distance(case, subject.traits))
+    rounding = segment_tolerance(case, largest, case.largest_coordinate)  # Places on the way are rounded there.
     jumps = find_jumps(forces, samples, HALVINGS, ALLOWED)
     values = {FORCE: ratio(jumps[0][1], size)}
     tolerances = {FORCE: ALLOWED * ratio(_largest_step(samples), size) + rounding}

@@ -1,11 +1,12 @@
-"""The property `continuity`: jumps are found with their size and place, and smooth formulations are not accused."""
+"""The properties `continuity` and `symmetric`: jumps are found, and smooth formulations are not accused."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
-from subjects import judge_as, load_subject, with_promises
+from subjects import judge_as, load_property, load_subject, with_promises
 from textbook_cells import ClippedCells, WeightedGaps
 from zoo.at_points import SlaveNormalAtGaussPoints
 
@@ -43,6 +44,15 @@ class Cloud:
 def test_a_smooth_formulation_without_a_pairing_is_not_accused() -> None:
     for case in cases(12):
         judge_as(Verdict.PASS, continuity, case, Subject("cloud", Cloud))
+
+
+def test_far_from_the_origin_positions_are_rounded_whoever_measures_gaps() -> None:
+    symmetry, subject = load_property("symmetric"), load_subject("vts-g:area=reference")
+    assert subject.traits.promises.symmetric
+    assert subject.traits.promises.translation_stable
+    for case in draw_cases(symmetry.cases(None), seed="symmetric", examples=6).cases:
+        far = replace(case, z=case.z + 2.0 ** (12 + np.ceil(np.log2(case.diameter))))
+        judge_as(Verdict.PASS, symmetry, far, subject)
 
 
 @pytest.mark.parametrize("make", [SlaveNormalAtGaussPoints, ClippedCells, WeightedGaps])
