@@ -274,15 +274,20 @@ class CheckedFormulation:
     def own_pairing(self, interface: Interface, z: FloatArray) -> Pairing | None:
         """Return the pairing at one state z (n_unknowns,), with a handle if it has one; None without ``pair``."""
         self._check_size(interface, z)
-        reach, positions = self._traits.abilities.reach, z[: interface.n_unknowns].reshape(interface.nodes.shape)
-        if reach is not None and find_depth(interface, positions) > _BELOW_REACH * reach:
-            raise PluginError(_TOO_DEEP, "not asked")
+        self._check_depth(interface, z)
         if "pair" not in self.provides:
             return None
         answer = _call_plugin("pair", self.plugin.pair, interface, freeze(z, np.float64))
         pairing = answer if isinstance(answer, Pairing) else _call_plugin("pair", Pairing, answer)
         pairing.check_bounds(interface)
         return pairing
+
+    def _check_depth(self, interface: Interface, *states: Array) -> None:
+        if (reach := self._traits.abilities.reach) is None:
+            return
+        positions = (z[: interface.n_unknowns].real.reshape(interface.nodes.shape) for z in states)
+        if any(find_depth(interface, each) > _BELOW_REACH * reach for each in positions):
+            raise PluginError(_TOO_DEEP, "not asked")
 
     def _pairing_at(self, interface: Interface, pairing: Pairing | None, z: Array) -> Pairing | None:
         return self.own_pairing(interface, z.real) if self.decides_anew(pairing) else pairing
@@ -303,6 +308,8 @@ class CheckedFormulation:
             return forces
         if z.ndim == 1:
             pairing = self._pairing_at(interface, pairing, z)
+        elif self.decides_anew(pairing):  # The plugin's process takes the pairings.
+            self._check_depth(interface, *z.reshape(-1, z.shape[-1]))
         forces = _call_plugin("residual", self.plugin.residual, interface, pairing, freeze(z, z.dtype.type))
         return _check_forces("residual", forces, z)
 

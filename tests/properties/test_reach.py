@@ -9,6 +9,7 @@ from zoo.at_points import GaussClosest
 from zoo.on_strips import SegmentPenalty
 
 from contactverif import Interface, Subject, Verdict, named_case
+from contactverif.contract.errors import PluginError
 from contactverif.contract.property import TOO_DEEP
 from contactverif.contract.reach import find_depth
 from contactverif.problems.flat_states import deep_face_states, deep_states
@@ -55,6 +56,17 @@ def test_a_formulation_is_asked_down_to_the_depth_that_it_states(make: Any, accu
     if reach == DEPTH:  # All of its states are deeper.
         assert (deep.verdict, deep.foreign) == (Verdict.UNDECIDED, deep.planned)
         assert deep.reason == f"0 of 6 cases judged; too few are left because {TOO_DEEP}"
+
+
+def test_a_batch_of_states_is_no_deeper_where_another_process_pairs_them() -> None:
+    case = named_case("a1")
+    subject = Subject("short", type("Short", (ShortStrips,), {"traits": ShortStrips.traits.revise(reach=DEPTH)}))
+    formulation = subject.with_penalty(1.0)
+    formulation._prefetching = formulation.plugin  # Then batches go out whole.
+    lower = case.positions - np.where(np.arange(len(case.positions)) < case.interface.n_slave_nodes, 8.0, 0.0)[:, None]
+    with pytest.raises(PluginError, match="deeper than the formulation looks") as caught:
+        formulation.residual(case.interface, None, np.stack([case.z, lower.reshape(-1)]))
+    assert caught.value.cause == "not asked"
 
 
 def test_depths_are_measured_along_both_normals() -> None:
