@@ -55,7 +55,7 @@ ROOMS = {
     "meshes": Room(("contract", "isolation", "mechanics"), ("numpy", "scipy.sparse", "meshlane", "msgspec", "netCDF4")),
     "problems": Room(("contract", "oracle", "mechanics", "meshes"), ("numpy", "scipy", "skfem"), QUIET),
     "strategies": Room(("contract", "oracle", "mechanics", "problems"), ("numpy", "hypothesis"), QUIET),
-    "diagnosis": Room(("contract",), ("numpy",), QUIET),
+    "diagnosis": Room(("contract", "oracle"), ("numpy",), QUIET),
     # It also reads the files that its links name, as resources of the package.
     "explanations": Room(("contract",), ("numpy",), QUIET),
     "plugins": Room(("contract", "isolation", "problems"), ("numpy", "scipy", "threadpoolctl", "psutil")),

@@ -10,7 +10,8 @@ from contactverif.contract.interface import Interface, Surface
 from contactverif.contract.result import OF_TANGENT
 from contactverif.contract.subject import CheckedFormulation, Subject
 from contactverif.contract.traits import PatchPromises
-from contactverif.diagnosis.flat_state import DEPTH, PENALTY, flat_state, residual_of
+from contactverif.diagnosis.changes import diagnose_changes
+from contactverif.diagnosis.flat_state import PENALTY, flat_state, residual_of
 from contactverif.diagnosis.force_patterns import diagnose_forces, find_lost_places
 from contactverif.diagnosis.matching_pairs import diagnose_matching
 from contactverif.diagnosis.tangent_patterns import diagnose_tangent
@@ -26,9 +27,6 @@ _OF_FORCES = (
     "accuracy.",
     "projection.",
 )
-_SCALES = range(4, 49, 4)  # The mesh is as many times smaller, and then larger, as 2 to these powers.
-# A power of two changes no rounding, and an absolute length in the code soon changes forces by far more than this.
-_SAME_SCALED = 2.0**-20
 _TILT = 2.0**-4  # The slope of a slave that has other normals.
 _SLIDE = 0.625  # The way along the surface after which most slave nodes face another segment.
 
@@ -42,7 +40,7 @@ def diagnose(subject: Subject, property_id: str, others: Sequence[str] = ()) -> 
     try:
         with np.errstate(all="ignore"):
             if subject.traits.rules.own_law:  # Patterns are of forces in proportion to the gap.
-                return ""
+                return diagnose_changes(subject) or diagnose_tangent(subject)
             springs = subject.traits.rules.enforcement == "penalty" and subject.traits.abilities.in_plane
             if springs and (text := _diagnose_numbering(subject)):
                 return text
@@ -59,7 +57,7 @@ def diagnose(subject: Subject, property_id: str, others: Sequence[str] = ()) -> 
             text = text or diagnose_forces(subject, in_full=in_full)
             # Whether digits are lost depends on sizes, too, without any length in the code.
             if not text and not property_id.startswith(("stability.", *_OF_TANGENTS)):
-                text = _diagnose_scale(subject)
+                text = diagnose_changes(subject)
             # A right tangent is no derivative of wrong forces, and says nothing of these.
             if not text and any(name.startswith(_OF_FORCES) for name in every):
                 return ""
@@ -81,26 +79,6 @@ def _diagnose_numbering(subject: Subject) -> str:
         except NonFiniteError:
             words[False] = f"where nodes are numbered {name} the surfaces"
     return f"the forces are not finite {words[False]}, and finite {words[True]}" if len(words) > 1 else ""
-
-
-def _diagnose_scale(subject: Subject) -> str:
-    if subject.traits.rules.enforcement != "penalty" or not subject.traits.abilities.in_plane:
-        return ""
-    reference = _scaled_forces(subject, 1.0)
-    for sign, word in ((-1, "smaller"), (1, "larger")):
-        for power in _SCALES:
-            factor = 2.0 ** (sign * power)
-            forces = _scaled_forces(subject, factor)
-            if np.abs(forces - reference).max() > _SAME_SCALED * np.abs(reference).max():
-                sizes = f"gaps of {factor * DEPTH:.1e} on segments of about {factor:.1e}"
-                return f"forces do not scale with a mesh 2^{power} times {word} ({sizes}): look for an absolute length"
-    return ""
-
-
-def _scaled_forces(subject: Subject, factor: float) -> FloatArray:
-    case = flat_state().case
-    interface = case.interface.at(case.interface.nodes * factor)
-    return residual_of(subject, interface, case.z * factor) / factor**2  # A force is ε̂ |g| times a length.
 
 
 def _diagnose_memory(subject: Subject) -> str:

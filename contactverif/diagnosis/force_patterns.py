@@ -22,22 +22,31 @@ from contactverif.diagnosis.flat_state import (
     FlatState,
     equal,
     flat_state,
+    flat_state_of,
     pushes_of,
-    residual_of,
     same,
     spell,
 )
+from contactverif.diagnosis.matching_pairs import diagnose_skewed
 
 _MOST_POINTS = 4  # More points of integration are used by hardly anybody.
 # The slave is moved along the master by these lengths. Its nodes pass nearly all of it, and face no node.
 _SHIFTS = (np.arange(-61, 61) + 0.5) / 128
 # The heights of all nodes of the slave but one, over its depth, from one at which only the nearest point presses.
 _LIFTS = 2.0 ** np.arange(6, -3, -1)
-_TILT = 0.25  # The slope of a slave whose forces must balance, too.
 # A change of places near 1 that single precision, with digits of 2^-24, does not see, and one that it sees.
 _TOO_SMALL, _LARGE = 2.0**-26, 2.0**-12
 # The penetrations of a law are 2 to the power of minus these, small against all segments.
 _POWERS = range(16, 4, -1)
+_SLENDER = 16.0
+_OVERHANG = "where the slave reaches past both ends of the master"
+_PLACES = {
+    "on a slave that is finer than its master": FINE,
+    "on a slave that is coarser than its master": COARSE,
+    "where a master segment faces 12 slave segments": (np.linspace(0.0, 3.0, 13), MASTER[[0, -1]]),
+    "where a slave segment faces 12 master segments": (SLAVE[[0, -1]], np.linspace(3.625, -0.5, 15)),
+    _OVERHANG: (SLAVE, MASTER[1:-1]),
+}
 # The penetrations of the slave's nodes, over DEPTH, in which the segment of that number is open.
 _OPEN = {0: np.array([-1.0, 0.0, 1.0, 1.0]), len(SLAVE) - 2: np.array([1.0, 1.0, 0.0, -1.0])}
 
@@ -53,7 +62,10 @@ def diagnose_forces(subject: Subject, *, in_full: bool) -> str:
 
 def _patterns(subject: Subject, in_full: bool) -> Iterator[str]:
     rules, promises = subject.traits.rules, subject.traits.promises
-    if rules.enforcement != "penalty" or not subject.traits.abilities.in_plane:
+    if rules.enforcement != "penalty":
+        return
+    if not subject.traits.abilities.in_plane:
+        yield from _patterns_in_space(subject, in_full)
         return
     yield _find_lost_sums(subject)
     if rules.penalty is not None:  # Else the pressure may be any function of the penetration.
@@ -63,35 +75,46 @@ def _patterns(subject: Subject, in_full: bool) -> Iterator[str]:
     yield _diagnose_digits(subject)
     state = flat_state()
     forces = pushes_of(subject, state)
-    yield from _uniform_patterns(state, forces, in_full)
+    yield from _uniform_patterns(subject, state, in_full)
     if np.abs(forces[:, 0]).max() > SAME * np.abs(forces[:, 1]).max():
         yield "the forces have a part along the surface, where both normals are the same"
     for state in (flat_state(slope=1.0), flat_state(slope=1.0, places=(SLAVE, MASTER[[0, -1]]))):
         pushes = pushes_of(subject, state)[:, 1]
         if not same(pushes, state.exact):  # Other rules of integration give other forces, and are not wrong.
             yield _exchange(state, pushes, 0) or _exchange(state, pushes, 1)
-    for places, words in ((FINE, "finer"), (COARSE, "coarser")):
+    for words, places in _PLACES.items():
         state = flat_state(places=places)
-        for text in filter(None, _uniform_patterns(state, pushes_of(subject, state), in_full)):
-            yield f"on a slave that is {words} than its master: {text}"
-    yield _diagnose_turned(subject)
+        if words != _OVERHANG or promises.patch.overhang:
+            for text in filter(None, _uniform_patterns(subject, state, in_full)):
+                yield f"{words}: {text}"
     for number, depths in _OPEN.items():
         pushes = pushes_of(subject, flat_state(depths=DEPTH * depths))[: len(SLAVE), 1]
         if free := [node for node in np.flatnonzero(depths > 0) if pushes[node] == 0]:
             yield f"where slave segment {number} is open, nothing pushes {spell('slave node', free)}, which penetrate"
-    if promises.conserves_force:
-        yield _diagnose_balance(subject)
 
 
-def _uniform_patterns(state: FlatState, forces: FloatArray, in_full: bool) -> Iterator[str]:
-    pushes, n = forces[:, 1], state.n_slave_nodes
+def _patterns_in_space(subject: Subject, in_full: bool) -> Iterator[str]:
+    if subject.traits.rules.penalty == "nodal" or subject.traits.promises.patch.flat is False:
+        return
+    for words, slender in (("", 1.0), ("on slender faces: ", _SLENDER)):
+        for corners in sorted(subject.traits.abilities.faces):
+            state = flat_state_of(corners, slender=slender)
+            yield from (words + text for text in _uniform_patterns(subject, state, in_full) if text)
+    yield diagnose_skewed(subject)
+
+
+def _uniform_patterns(subject: Subject, state: FlatState, in_full: bool) -> Iterator[str]:
+    rules, forces = subject.traits.rules, pushes_of(subject, state)
+    knows_total = rules.penalty == "distributed" and rules.area is not None
+    pushes, n = forces[:, -1], state.n_slave_nodes
     if not forces.any():
         yield "there is no force at all where the surfaces penetrate"
     if same(pushes, state.exact):
         return
     yield _segment_pattern(state, pushes, 0)
     yield _segment_pattern(state, pushes, 1)
-    yield _exchange(state, pushes, 1)
+    if state.in_plane:
+        yield _exchange(state, pushes, 1)
     if in_full:
         yield from _patterns_of_pieces(state, pushes)
     if same(pushes[:n], np.full(n, PENALTY * DEPTH)):
@@ -99,6 +122,8 @@ def _uniform_patterns(state: FlatState, forces: FloatArray, in_full: bool) -> It
         yield f"each slave node has a whole spring, ε̂ |g|: {nodal}; else the length at the node is missing"
     if in_full:
         yield _side_pattern(state, pushes)
+    elif knows_total and not same(pushes[:n].sum(keepdims=True), state.exact[:n].sum(keepdims=True)):
+        yield f"the forces on the slave are wrong{_total(pushes[:n], state.exact[:n])}"
 
 
 def _patterns_of_pieces(state: FlatState, pushes: FloatArray) -> Iterator[str]:
@@ -111,6 +136,8 @@ def _patterns_of_pieces(state: FlatState, pushes: FloatArray) -> Iterator[str]:
         owners = "nodes that belong to several pieces"
         yield f"{owners} have the force of one alone: the others are overwritten, and not added (`np.add.at`)"
     yield _piece_factors(state, pushes)
+    if not state.in_plane:
+        return
     rules = [np.polynomial.legendre.leggauss(n_points) for n_points in range(1, _MOST_POINTS + 1)]
     for side, ends, nodes in zip(("slave", "master"), state.ends, state.sides, strict=True):
         for places, weights in rules:
@@ -154,14 +181,16 @@ def _segment_pattern(state: FlatState, pushes: FloatArray, side: int) -> str:
     factors: FloatArray = np.linalg.lstsq(parts, pushes, rcond=None)[0]
     if not same(parts @ factors, pushes) or (wrong := ~equal(factors, np.ones(len(factors)))).all():
         return ""
-    name = ("slave", "master")[side]
+    if factors.min() < -SAME:  # On few nodes factors are not unique.
+        return ""
+    name, word = ("slave", "master")[side], "segment" if state.in_plane else "face"
     missed = [int(segment) for segment, factor in zip(segments, factors, strict=True) if abs(factor) < SAME]
     if len(missed) == wrong.sum():
         are = "is" if len(missed) == 1 else "are"
-        return f"{spell(f'{name} segment', missed)} {are} left out{_ends(missed, len(segments))}"
-    words = ", ".join(f"{name} segment {segments[n]} {_times(factors[n])}" for n in np.flatnonzero(wrong))
+        return f"{spell(f'{name} {word}', missed)} {are} left out{_ends(missed, len(segments))}"
+    words = ", ".join(f"{name} {word} {segments[n]} {_times(factors[n])}" for n in np.flatnonzero(wrong))
     ends = _ends(segments[wrong].tolist(), len(segments))
-    return f"segments have forces of another size: {words} the exact one, all others right{ends}"
+    return f"{word}s have forces of another size: {words} the exact one, all others right{ends}"
 
 
 def _ends(numbers: Sequence[int], total: int) -> str:
@@ -176,30 +205,35 @@ def _piece_factors(state: FlatState, pushes: FloatArray) -> str:
     factors = np.asarray(np.linalg.lstsq(state.pieces.T, pushes, rcond=None)[0], dtype=np.float64)
     if not same(state.pieces.T @ factors, pushes):
         return ""
-    of_slave, of_master = (np.abs(np.diff(state.along[ends])[:, 0]) for ends in state.ends)
-    lengths = {
+    faces, nodes = state.case.interface, state.case.interface.nodes
+    word, size = ("segment", "length") if state.in_plane else ("face", "area")
+    of_slave, of_master = (
+        side.measures(nodes)[numbers] for side, numbers in zip((faces.slave, faces.master), state.segments, strict=True)
+    )
+    sizes = {
         "is counted, too": of_master,
         "divides the force": 1 / of_master,
-        "stands where that of the slave segment belongs": of_master / of_slave,
+        f"stands where that of the slave {word} belongs": of_master / of_slave,
     }
-    for words, ratios in lengths.items():
+    for words, ratios in sizes.items():
         if same(factors, ratios):
-            return f"the length of the master segment {words}"
+            return f"the {size} of the master {word} {words}"
     missed = np.abs(factors) < SAME
     if not missed.any() or not same(factors[~missed], np.ones(len(factors) - missed.sum())):
         return ""
     pairs = zip(*(numbers[missed] for numbers in state.segments), strict=True)
-    return f"parts are left out: {', '.join(f'slave segment {a} on master segment {b}' for a, b in pairs)}"
+    return f"parts are left out: {', '.join(f'slave {word} {a} on master {word} {b}' for a, b in pairs)}"
 
 
 def _side_pattern(state: FlatState, pushes: FloatArray) -> str:
-    slave, master = ((pushes[nodes], state.exact[nodes], state.along[nodes]) for nodes in state.sides)
+    places = state.case.positions[:, :-1]
+    slave, master = ((pushes[nodes], state.exact[nodes], places[nodes]) for nodes in state.sides)
     if same(*slave[:2]):
         return "the forces on the slave are right, those on the master are not" + _total(*master[:2])
     total = _total(*slave[:2])
     if same(*master[:2]):
         return "the forces on the master are right, those on the slave are not" + total
-    sums = [np.array([part.sum(), part @ places]) for part, _, places in (slave, master)]
+    sums = [np.append(part.sum(), part @ at) for part, _, at in (slave, master)]
     if same(*sums) and slave[0].sum() > 0:  # What is integrated acts alike on both sides.
         total += "; the sides balance, in moments too: look at the points of integration, their weights and their range"
     return f"the forces are wrong on both sides{total}"
@@ -222,9 +256,9 @@ def _sum_at_points(state: FlatState, places: FloatArray, weights: FloatArray) ->
         length = along[nodes[1]] - along[nodes[0]]
         for place, weight in zip(places, weights, strict=True):
             shares = (along[nodes[0]] + place * length - along[master[:, 0]]) / np.diff(along[master], axis=1)[:, 0]
-            (segment,) = np.flatnonzero((shares >= 0) & (shares < 1))
-            for ends, share in ((nodes, place), (master[segment], shares[segment])):
-                forces[ends] += PENALTY * DEPTH * length * weight * np.array([1 - share, share])
+            for segment in np.flatnonzero((shares >= 0) & (shares < 1)):
+                for ends, share in ((nodes, place), (master[segment], shares[segment])):
+                    forces[ends] += PENALTY * DEPTH * length * weight * np.array([1 - share, share])
     return forces
 
 
@@ -279,21 +313,6 @@ def _find_lost_sums(subject: Subject) -> str:
     return ""
 
 
-def _diagnose_turned(subject: Subject) -> str:
-    state = flat_state()
-    interface, positions = state.case.interface, state.case.positions
-    expected = None
-    for degrees, x, y in ((0, 1, 0), (90, 0, 1), (180, -1, 0), (270, 0, -1)):
-        turn = np.array([[x, y], [-y, x]], dtype=np.float64)  # So it takes rows to rows, without any rounding.
-        turned, z = interface.at(interface.nodes @ turn), (positions @ turn).reshape(-1)
-        forces = residual_of(subject, turned, z).reshape(-1, 2) @ turn.T
-        expected = forces if expected is None else expected
-        if not same(forces, expected):
-            words = "are reversed" if same(forces, -expected) else "do not turn with it"
-            return f"on a mesh that is turned by {degrees}° the forces {words}: look at the normal, and at angles"
-    return ""
-
-
 def _diagnose_digits(subject: Subject) -> str:
     state = flat_state()
     formulation, interface = subject.for_case(state.case), state.case.interface
@@ -309,40 +328,15 @@ def _diagnose_digits(subject: Subject) -> str:
     return ""
 
 
-def _diagnose_balance(subject: Subject) -> str:
-    state = flat_state(slope=_TILT, depth=1.0)
-    n, pushes = state.n_slave_nodes, pushes_of(subject, state)
-    on_slave, on_master = pushes[:n].sum(axis=0), pushes[n:].sum(axis=0)
-    if not same(on_slave, on_master):
-        sides = [_name_direction(force) for force in (on_slave, on_master)]
-        words = f"they are along {sides[0]} normal on the slave, along {sides[1]} normal on the master"
-        if sides[0] == sides[1]:
-            words = f"the master gets {_times(float(np.linalg.norm(on_master) / np.linalg.norm(on_slave)))} the slave's"
-        return f"the forces on the sides of a tilted slave do not balance: {words}"
-    x, y = state.case.positions.T
-    moments = x * pushes[:, 1] - y * pushes[:, 0]
-    if not subject.traits.promises.conserves_moment or same(moments[:n].sum(), moments[n:].sum()):
-        return ""
-    along = f"along the force, which is along {_name_direction(on_slave)} normal"
-    return (
-        "the forces on the sides of a tilted slave balance, and their moments do not: the points that push each other "
-        f"do not face each other {along}: look at the projection"
-    )
-
-
-def _name_direction(force: FloatArray) -> str:
-    normals = {"the slave's": np.array([_TILT, 1.0]), "the master's": np.array([0.0, 1.0])}
-    size = np.linalg.norm(force)
-    names = (name for name, normal in normals.items() if same(force, normal * size / np.linalg.norm(normal)))
-    return next(names, "another")
-
-
 def _diagnose_law(subject: Subject) -> str:
     depths = np.array([2.0**-power for power in _POWERS])
     states = [flat_state(depth=depth) for depth in depths]
     shares = np.array([pushes_of(subject, state)[:, 1].sum() / state.exact.sum() for state in states])
     if same(shares, np.full(len(shares), shares[0])):
         return ""
+    slope, offset = np.polyfit(depths, shares * depths, 1)
+    if offset and same(shares * depths, slope * depths + offset):
+        return f"the gap that counts is off by {offset / slope:.3g}, on segments of length 1"
     powers = np.diff(np.log2(np.abs(shares)))
     if np.isfinite(powers).all() and same(powers, np.full(len(powers), powers[0])):
         power = f"{1 + powers[0]:.3g}"

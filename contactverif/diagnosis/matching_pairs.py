@@ -13,9 +13,10 @@ import numpy as np
 
 from contactverif.contract.arrays import FloatArray, IntArray
 from contactverif.contract.case import Case
-from contactverif.contract.interface import PLANE, SEGMENT, SPACE, TRIANGLE, Interface, Surface
+from contactverif.contract.interface import PLANE, QUADRILATERAL, SEGMENT, SPACE, Interface, Surface
 from contactverif.contract.subject import Subject
-from contactverif.diagnosis.flat_state import DEPTH, PENALTY, SAME, residual_of, same
+from contactverif.diagnosis.flat_state import DEPTH, PENALTY, SAME, grid, residual_of, same
+from contactverif.oracle.flat_answers import uniform_surface_weights
 
 _MEANINGS = {  # {factor: what it may mean}
     2.0: "two passes that each have the whole penalty, or a factor 2",
@@ -25,7 +26,8 @@ _MEANINGS = {  # {factor: what it may mean}
 # The places of nodes along the axes, so that no two cells are alike; and others.
 _STEPS = np.array([0.0, 1.0, 2.25, 3.125, 4.75]), np.array([0.0, 1.375, 2.0, 3.875, 5.0])
 _SIZES = {PLANE: ((1, 0), (2, 0), (4, 0)), SPACE: ((1, 1), (2, 1), (2, 2))}  # The cells along the axes.
-_SHEAR = 0.25  # Quadrilaterals are parallelograms: there all rules of integration agree.
+_SKEW = np.array([0.25, -0.375])  # The way of a node in the middle of four quadrilaterals.
+_SAME_SKEWED = 1e-2  # Shape functions are no polynomials of the place there.
 _Surface = tuple[FloatArray, IntArray]  # Points (n, dim), and faces as the master has them.
 
 
@@ -65,7 +67,7 @@ def diagnose_matching(subject: Subject) -> str:
 
 def _patterns(subject: Subject, corners: int) -> Iterator[str]:
     sizes = _SIZES[PLANE if corners == SEGMENT else SPACE]
-    surfaces = [_grid(corners, _STEPS[k][: nx + 1], _STEPS[1 - k][: ny + 1]) for k in (0, 1) for nx, ny in sizes]
+    surfaces = [grid(corners, _STEPS[k][: nx + 1], _STEPS[1 - k][: ny + 1]) for k in (0, 1) for nx, ny in sizes]
     numbered = [(surface, shift) for number, surface in enumerate(surfaces, 1) for shift in (0, number)]
     pairs = [_pair(surface, DEPTH * (1 + shift % 2), shift) for surface, shift in numbered]
     forces, rules = [_pushes(subject, pair) for pair in pairs], subject.traits.rules
@@ -82,8 +84,9 @@ def _patterns(subject: Subject, corners: int) -> Iterator[str]:
     if not presses or all(map(same, forces, exact)):
         return
     factors = _fit(forces, [[right] for right in exact])
-    # Two passes are right with twice the force.
-    if factors is not None and not (subject.traits.promises.unbiased and abs(factors[0] - 2.0) <= SAME):
+    if factors is not None and subject.traits.promises.unbiased and abs(factors[0] - 2.0) <= SAME:
+        return  # Two passes are right with twice the force.
+    if factors is not None:
         near = [f": {words}" for known, words in _MEANINGS.items() if abs(factors[0] - known) <= SAME]
         yield f"every node has {factors[0]:.4g} times the exact force{''.join(near)}"
     of_slave = [right * pair.is_slave for pair, right in zip(pairs, exact, strict=True)]
@@ -100,6 +103,25 @@ def _patterns(subject: Subject, corners: int) -> Iterator[str]:
         yield f"only {'free ends' if corners == SEGMENT else 'nodes at the border'} are wrong: {words}"
     if rules.penalty != "nodal":
         yield from _patterns_of_faces(pairs, forces, corners)
+
+
+def diagnose_skewed(subject: Subject) -> str:
+    """Return whether forces on a matching pair are wrong only where quadrilaterals are no parallelograms."""
+    promises = subject.traits.promises.patch
+    if QUADRILATERAL not in subject.traits.abilities.faces or not (promises.flat or promises.normal):
+        return ""
+    points, faces = grid(QUADRILATERAL, *(steps[:3] for steps in _STEPS))
+    middle = len(points) // 2
+    points[middle, :2] += _SKEW
+    pair = _pair((points, faces), DEPTH, 0)
+    nodes, domain = pair.case.interface.nodes[:, :2], points[[0, 2, -1, -3], :2]
+    exact, pushes = uniform_surface_weights(pair.case.interface, nodes, domain), _pushes(subject, pair)
+    if np.abs(pushes - exact).max() <= _SAME_SKEWED * exact.max():
+        return ""
+    total = float(pushes.sum() / exact.sum())
+    sums = "their sum is right" if abs(total - 1) <= SAME else f"their sum is {total:.4g} times the exact one"
+    words = f"forces are right on parallelograms, and wrong on other quadrilaterals, {sums}"
+    return f"{words}: look at the Jacobian of each point and at the order of corners"
 
 
 def _patterns_of_faces(pairs: Sequence[_Pair], forces: Sequence[FloatArray], corners: int) -> Iterator[str]:
@@ -131,16 +153,6 @@ def _fit(values: Sequence[FloatArray], columns: Sequence[Sequence[FloatArray]]) 
     factors = np.asarray(np.linalg.lstsq(matrix, stacked, rcond=None)[0], dtype=np.float64)
     fits = np.abs(matrix @ factors - stacked).max() <= SAME * np.abs(stacked).max()
     return np.where(np.abs(factors) < SAME, 0.0, factors) if fits else None
-
-
-def _grid(corners: int, *steps: FloatArray) -> _Surface:
-    if corners == SEGMENT:
-        x, numbers = steps[0][::-1], np.arange(len(steps[0]))
-        return np.column_stack([x, 0 * x]), np.column_stack([numbers[:-1], numbers[1:]])
-    points = np.array([[x + _SHEAR * y, y, 0.0] for y, x in product(steps[1], steps[0])])
-    n = len(steps[0])
-    faces: IntArray = np.arange(len(points)).reshape(-1, n)[:-1, :-1].reshape(-1, 1) + np.array([0, 1, n + 1, n])
-    return points, faces[:, [0, 1, 2, 0, 2, 3]].reshape(-1, 3) if corners == TRIANGLE else faces
 
 
 def _number(points: FloatArray, faces: IntArray, shift: int) -> _Surface:

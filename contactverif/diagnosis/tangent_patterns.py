@@ -12,8 +12,9 @@ from itertools import product
 import numpy as np
 
 from contactverif.contract.arrays import BoolArray, FloatArray, dense
+from contactverif.contract.interface import PLANE, SEGMENT
 from contactverif.contract.subject import Subject
-from contactverif.diagnosis.flat_state import MASTER, SLAVE, FlatState, flat_state, spell
+from contactverif.diagnosis.flat_state import MASTER, PENALTY, SLAVE, FlatState, flat_state, flat_state_of, spell
 
 DEPTHS = tuple(2.0**-power for power in (5, 6, 7, 8))
 # Central differences of a step of 2^-20 of forces that are smooth over 1 err by less, over the largest entry.
@@ -23,17 +24,19 @@ _BEND = 2.0**-11  # The step of second differences, a fraction of the smallest d
 _DIFFERENCES = 0.05  # The share of the errors of one-sided differences that a second derivative may leave.
 _SHORT_MASTER = MASTER[1:-1]  # The slave reaches past both of its ends.
 _PARTLY_APART = -0.625  # The slope of a penetration that ends at 1.6, inside a segment of either side.
+_BARRIER = 0.75  # The largest gap over the activation distance, and the length of the shortest segment
 _POWER = 0.25  # A part grows like g^k if the measured power is as near to k.
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Tangents:
-    """A tangent beside the derivative, for each depth; rows and columns (n_nodes, 2) are t and n."""
+    """A tangent beside the derivative, for each depth; rows and columns (n_nodes, dim) are t, then n."""
 
     tangents: FloatArray  # (n_depths, n, n)
     derivatives: FloatArray  # (n_depths, n, n)
     curvatures: FloatArray  # (n_depths, n, n): the second derivative of each row by the unknown of the column.
-    n_slave: int  # The number of rows of the slave, which come first.
+    n_slave: int  # The number of slave nodes, which come first.
+    dim: int
 
     @property
     def errors(self) -> FloatArray:
@@ -48,14 +51,19 @@ class Tangents:
 
 def diagnose_tangent(subject: Subject) -> str:
     """Return which part of the tangent is wrong; empty where it is right, or no rule knows the mistake."""
-    approximate = subject.traits.promises.tangent == "approximate" or not subject.traits.abilities.in_plane
-    if subject.traits.rules.enforcement != "penalty" or approximate or "tangent" not in subject.provides:
+    rules, abilities = subject.traits.rules, subject.traits.abilities
+    if subject.traits.promises.tangent == "approximate" or "tangent" not in subject.provides:
         return ""
-    pair = _measure(subject, [flat_state(depth=depth) for depth in DEPTHS])
-    if pair.scale == 0:
+    is_penalty, depths = rules.enforcement == "penalty" and not rules.own_law, DEPTHS
+    if rules.enforcement == "barrier":
+        depths = tuple(-16 * _BARRIER * (rules.activation or 0.0) * depth for depth in DEPTHS)
+    kinds = [SEGMENT] if abilities.in_plane else sorted(abilities.faces)
+    for corners in kinds:
+        pair = _measure(subject, [flat_state_of(corners, depth) for depth in depths])
+        if pair.scale > 0 and not _is_small(pair.errors, pair.scale):
+            return next(filter(None, _patterns(pair, is_penalty=is_penalty)), "")
+    if not (is_penalty and abilities.in_plane):
         return ""
-    if not _is_small(pair.errors, pair.scale):
-        return next(filter(None, _patterns(pair)), "")
     pair = _measure(subject, [flat_state(depth=DEPTHS[0], places=(SLAVE, _SHORT_MASTER))])
     if nodes := _wrong_nodes(pair, axis=0):
         return (
@@ -70,29 +78,34 @@ def diagnose_tangent(subject: Subject) -> str:
 
 
 def _measure(subject: Subject, states: Sequence[FlatState]) -> Tangents:
-    tangents, derivatives, curvatures, n_slave = [], [], [], 0
+    tangents, derivatives, curvatures = [], [], []
+    step = STEP * min(1.0, abs(states[-1].depth) / DEPTHS[-1])
     for state in states:
-        case, formulation = state.case, subject.for_case(state.case)
-        interface, z, n = case.interface, case.z, case.z.size
-        pairing = formulation.pair(interface, z)
+        case, formulation = state.case, subject.for_interface(state.case.interface, PENALTY)
+        interface, n = case.interface, case.z.size
+        z = np.append(case.z, np.full(formulation.n_multipliers(interface), PENALTY * DEPTHS[0]))
+        pairing, ways = formulation.pair(interface, z), np.eye(n, z.size)
         at = [
-            formulation.residual(interface, pairing, np.concatenate([z + step * np.eye(n), z - step * np.eye(n)]))
-            for step in (STEP, _BEND)
+            formulation.residual(interface, pairing, np.concatenate([z + way * ways, z - way * ways]))[:, :n]
+            for way in (step, _BEND)
         ]
-        derivatives.append((at[0][:n] - at[0][n:]).T / (2 * STEP))
-        middle = formulation.residual(interface, pairing, z)
+        derivatives.append((at[0][:n] - at[0][n:]).T / (2 * step))
+        middle = formulation.residual(interface, pairing, z)[:n]
         curvatures.append((at[1][:n] + at[1][n:] - 2 * middle).T / _BEND**2)
-        tangents.append(dense(formulation.tangent(interface, pairing, z)))
-        n_slave = 2 * state.n_slave_nodes
-    return Tangents(np.stack(tangents), np.stack(derivatives), np.stack(curvatures), n_slave)
+        tangents.append(dense(formulation.tangent(interface, pairing, z))[:n, :n])
+    first = states[0]
+    return Tangents(
+        np.stack(tangents), np.stack(derivatives), np.stack(curvatures), first.n_slave_nodes, first.case.interface.dim
+    )
 
 
-def _patterns(pair: Tangents) -> Iterator[str]:
+def _patterns(pair: Tangents, *, is_penalty: bool) -> Iterator[str]:
     yield _as_a_whole(pair)
     yield _one_line(pair)
-    yield _one_entry(pair)
-    number = np.arange(pair.tangents.shape[1])
-    for side, columns in (("slave", number < pair.n_slave), ("master", number >= pair.n_slave)):
+    if pair.dim == PLANE:
+        yield _one_entry(pair)
+    of_slave = np.arange(pair.tangents.shape[1]) < pair.dim * pair.n_slave
+    for side, columns in (("slave", of_slave), ("master", ~of_slave)):
         if not pair.tangents[:, :, columns].any() and _is_small(pair.errors[:, :, ~columns], pair.scale):
             yield f"the columns of all {side} nodes are missing: the tangent takes the {side} for rigid"
     # One-sided differences err by half a step times the second derivative, and what follows it is smaller by the step
@@ -101,7 +114,7 @@ def _patterns(pair: Tangents) -> Iterator[str]:
     rest = np.abs(pair.errors - step / 2 * pair.curvatures).max()
     if rest <= _DIFFERENCES * np.abs(pair.errors).max():  # It is NaN where forces are linear.
         yield f"the tangent is of one-sided differences with a step of about {abs(step):.1g}, on segments of length 1"
-    yield _one_part(pair)
+    yield _one_part(pair, is_penalty=is_penalty)
 
 
 def _as_a_whole(pair: Tangents) -> str:
@@ -113,7 +126,7 @@ def _as_a_whole(pair: Tangents) -> str:
     factor = float((tangents * derivatives).sum() / (derivatives**2).sum())
     if _is_small(tangents - factor * derivatives, pair.scale):
         return f"the tangent has {'the opposite sign' if abs(factor + 1) < SAME else f'a factor {factor:.4g}'}"
-    order = np.arange(tangents.shape[1]).reshape(-1, 2).T.reshape(-1)  # All x, then all y.
+    order = np.arange(tangents.shape[1]).reshape(-1, pair.dim).T.reshape(-1)  # All x, then all y.
     if any(_is_small(tangents - derivatives[:, each][:, :, each], pair.scale) for each in (order, np.argsort(order))):
         return "the tangent numbers the unknowns in another order than the forces: all x before all y"
     if _is_small(tangents - (derivatives + derivatives.transpose(0, 2, 1)) / 2, pair.scale):
@@ -157,20 +170,21 @@ def _one_entry(pair: Tangents) -> str:
 
 
 def _unknown(number: int, pair: Tangents) -> str:
-    node, axis = divmod(number, 2)
-    return f"{'xy'[axis]} of {'slave' if number < pair.n_slave else 'master'} node {node}"
+    node, axis = divmod(number, pair.dim)
+    return f"{'xyz'[axis]} of {'slave' if node < pair.n_slave else 'master'} node {node}"
 
 
 def _wrong_nodes(pair: Tangents, axis: int) -> str:
     """Return the nodes of the rows (axis 1) or columns (axis 0) that are wrong at the first depth, in words."""
     unknowns = np.flatnonzero(np.abs(pair.errors[0]).max(axis=axis) > SAME * pair.scale)
-    nodes, n_slave = np.unique(unknowns // 2), pair.n_slave // 2
-    sides = {"slave": nodes[nodes < n_slave], "master": nodes[nodes >= n_slave]}
+    nodes = np.unique(unknowns // pair.dim)
+    sides = {"slave": nodes[nodes < pair.n_slave], "master": nodes[nodes >= pair.n_slave]}
     return " and ".join(spell(f"{side} node", part) for side, part in sides.items() if len(part))
 
 
-def _one_part(pair: Tangents) -> str:
-    numbers = {axis: np.arange("tn".index(axis), pair.errors.shape[1], 2) for axis in "tn"}  # t is x, and n is y.
+def _one_part(pair: Tangents, *, is_penalty: bool) -> str:
+    normal = np.arange(pair.errors.shape[1]) % pair.dim == pair.dim - 1
+    numbers = {"t": np.flatnonzero(~normal), "n": np.flatnonzero(normal)}
     blocks = {
         rows + columns: np.ix_(np.arange(len(DEPTHS)), numbers[rows], numbers[columns])
         for rows, columns in product("tn", repeat=2)
@@ -181,12 +195,12 @@ def _one_part(pair: Tangents) -> str:
             sizes = np.abs(errors).max(axis=(1, 2))
             powers[name] = float(np.log2(sizes[0] / sizes[-1]) / (len(DEPTHS) - 1)) if sizes[-1] > 0 else np.inf
     # A part that grows faster follows from the one below it, as a segment turns when its place along another changes.
-    powers = {name: power for name, power in powers.items() if power < min(powers.values()) + 1 - _POWER}
-    if len(powers) != 1:
+    powers = {n: power for n, power in powers.items() if not is_penalty or power < min(powers.values()) + 1 - _POWER}
+    if len(powers) != 1 or not is_penalty:
         names = " and ".join(f"{name[0]}–{name[1]}" for name in powers)
         return f"entries in {names} are wrong (n along the normal, t along the surface)" if powers else ""
     ((name, power),) = powers.items()
-    errors, n = pair.errors[blocks[name]], pair.n_slave // 2
+    errors, n = pair.errors[blocks[name]], pair.n_slave
     nearest = int(np.clip(np.rint(power), 0, len(DEPTHS)))  # It is infinite where only deep penetrations are wrong.
     for side, others in (("slave", errors[:, n:]), ("master", errors[:, :n])) if name == "nn" else ():
         if _is_small(others, pair.scale):
@@ -201,16 +215,17 @@ def _one_part(pair: Tangents) -> str:
 
 
 def _part_of(name: str, power: int, errors: FloatArray, pair: Tangents) -> str:
-    n = pair.n_slave // 2  # The rows, and the columns, of the slave in a block.
-    on_slave = {"rows": errors[:, :n], "columns": errors[:, :, :n]}
-    on_master = errors[:, :, n:]
+    rows, columns = (pair.n_slave * (1 if axis == "n" else pair.dim - 1) for axis in name)  # Of the slave in a block
+    on_slave = {"rows": errors[:, :rows], "columns": errors[:, :, :columns]}
+    on_master = errors[:, :, columns:]
     match name, power:
         case "nn", 0:
             return "the material part, in n–n"
         case "nt", 1 if _is_small(on_slave["rows"], pair.scale):
             return "the part of δξ, in n–t on the master's rows"
         case "nt", 1 if _is_small(on_master, pair.scale):
-            return "the part of the length of the slave's segments, in n–t on the slave's columns"
+            sizes = "length of the slave's segments" if pair.dim == PLANE else "area of the slave's faces"
+            return f"the part of the {sizes}, in n–t on the slave's columns"
         case "nt", 1:
             return "the part of the places of points (δξ) or of the lengths between them, in n–t on rows of both sides"
         case "tn", 1:
