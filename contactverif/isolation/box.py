@@ -14,7 +14,7 @@ import subprocess
 import sys
 import tempfile
 import uuid
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache
@@ -69,13 +69,11 @@ def enclose(command: tuple[str, ...], box: Box, megabytes: int) -> tuple[str, ..
     for path in box.opened:
         arguments += ["--share-net"] if path == NETWORK else ["--dev-bind", path, path]
     arguments += [word for path in box.hidden for word in _hide(path)]  # Also in what is open.
-    return _program(), *arguments, *_close((*always_hidden, *box.hidden), box.opened), "--", *command
-
-
-def _close(hidden: Iterable[str], opened: Iterable[str]) -> list[str]:
     # A plugin of root could write the settings of the whole system in /proc, and a folder of the box takes memory.
-    closed = {"/proc", "/dev", *map(os.path.realpath, hidden)} - set(map(os.path.realpath, opened))
-    return [word for path in sorted(closed) if os.path.isdir(path) for word in ("--remount-ro", path)]
+    closed = {"/proc", "/dev", *map(os.path.realpath, (*always_hidden, *box.hidden))}
+    closed -= set(map(os.path.realpath, box.opened))
+    arguments += [word for path in sorted(closed) if os.path.isdir(path) for word in ("--remount-ro", path)]
+    return _program(), *arguments, "--", *command
 
 
 def environment(box: Box, folder: str) -> dict[str, str]:

@@ -19,29 +19,11 @@ from contactverif.contract.arrays import Array
 from contactverif.contract.errors import ContractError, MisuseError, NonFiniteError, PluginError, one_line
 from contactverif.contract.formulation import Pairing
 from contactverif.contract.interface import Interface
+from contactverif.isolation import wire
 from contactverif.isolation.box import ATTEMPTS
 from contactverif.isolation.limits import Limits
 from contactverif.isolation.lockstep import wait_in_lockstep
 from contactverif.isolation.process import PINNING, NoBoxError, PluginProcess, Question, end_marked
-from contactverif.isolation.wire import (
-    MOST_QUESTIONS,
-    Answer,
-    Ask,
-    Failure,
-    Forget,
-    Load,
-    Loaded,
-    Make,
-    PackedArray,
-    Reply,
-    Request,
-    ShareInterface,
-    SharePairing,
-    Solve,
-    Solved,
-    encode,
-    join,
-)
 
 # A process starts in about a second. After so many ends the formulation is not asked any more, or after so many if it
 # has never returned forces or a solution.
@@ -61,7 +43,7 @@ _FORGET = 64  # The number of what can be forgotten before the process is told.
 _TOGETHER = 1 << 16  # Bytes. So much fits into a socket, so the judge never waits to send while the process does, too.
 # Questions go together if those of the last message took at most this share of their limit of time, or this share for
 # each of them. So the few of one case stay within the limit, and the many in lockstep are asked again if they do not.
-_QUICK, _QUICK_EACH = 1 / 32, 1 / (2 * MOST_QUESTIONS)
+_QUICK, _QUICK_EACH = 1 / 32, 1 / (2 * wire.MOST_QUESTIONS)
 
 
 class Host:
@@ -73,7 +55,7 @@ class Host:
         self._process: PluginProcess | None = None
         self._shelf: OrderedDict[int, tuple[Any, int]] = OrderedDict()
         # One list, so that an interrupt leaves no request whose question is missing.
-        self._queue: list[tuple[Request | Solve, Question | None]] = []
+        self._queue: list[tuple[wire.Request | wire.Solve, Question | None]] = []
         self._forgotten: list[int] = []
         self._number = 0
         self._last_words = b""
@@ -100,11 +82,11 @@ class Host:
         self.n_started += 1
         for store in (self._shelf, self._queue, self._forgotten, self._known_verbs):
             store.clear()
-        request = Load(self._next_number(), self._name)
+        request = wire.Load(self._next_number(), self._name)
         self._loading, self._load_began = self._put("import", request), monotonic()
-        self._process.send_ahead(join([encode(request)]))
+        self._process.send_ahead(wire.join([wire.encode(request)]))
 
-    def load(self) -> Reply:
+    def load(self) -> wire.Reply:
         """Let the process load the formulation, after a new start unless it does so already; return what that gave."""
         n_ended = self.n_ended
         for _ in range(ATTEMPTS):
@@ -122,16 +104,16 @@ class Host:
         """Make a formulation there, and return its number and the number of the process."""
         if self._process is None:
             wait_in_lockstep(lambda: False)  # A call in lockstep starts no process: all begin anew, one after another.
-            if not isinstance(self.load(), Loaded):
+            if not isinstance(self.load(), wire.Loaded):
                 raise PluginError("import: it loaded before, and does not any more", "channel")
-        self._queue.append((Make(self._next_number(), penalty), None))
+        self._queue.append((wire.Make(self._next_number(), penalty), None))
         return self._number, self.n_started
 
     def _next_number(self) -> int:
         self._number += 1
         return self._number
 
-    def _put(self, verb: str, request: Load | Ask | Solve, size: int = 0) -> Question:
+    def _put(self, verb: str, request: wire.Load | wire.Ask | wire.Solve, size: int = 0) -> Question:
         question = Question(request.question, verb, size)
         self._queue.append((request, question))
         return question
@@ -173,19 +155,19 @@ class Host:
         """
         of_interface = self._share(interface)
         of_pairing = self._share(pairing) if isinstance(pairing, Pairing) else pairing
-        packed = None if z is None else PackedArray.pack(z)
-        ask = Ask(self._next_number(), verb, formulation, of_interface, of_pairing, packed, timed, counted)
+        packed = None if z is None else wire.PackedArray.pack(z)
+        ask = wire.Ask(self._next_number(), verb, formulation, of_interface, of_pairing, packed, timed, counted)
         return self._put(verb, ask, 0 if z is None else z.size)
 
-    def solve(self, arrays: Mapping[str, Array]) -> Solved:
+    def solve(self, arrays: Mapping[str, Array]) -> wire.Solved:
         """Let the engine solve a scene, after a new start where its process has ended."""
         if self._process is None:
             self.load()
-        packed = {name: PackedArray.pack(array) for name, array in arrays.items()}
-        question = self._put("solve", Solve(self._next_number(), packed), sum(map(np.size, arrays.values())))
+        packed = {name: wire.PackedArray.pack(array) for name, array in arrays.items()}
+        question = self._put("solve", wire.Solve(self._next_number(), packed), sum(map(np.size, arrays.values())))
         self.flush()
         reply = raise_failure(question)
-        if not isinstance(reply, Solved):
+        if not isinstance(reply, wire.Solved):
             raise PluginError("solve: another reply than a solution", "channel")
         return reply
 
@@ -195,14 +177,15 @@ class Host:
             self._shelf.move_to_end(id(item))
             return self._shelf[id(item)][1]
         if isinstance(item, Pairing):
-            arrays = {name: PackedArray.pack(array) for name, array in item.items()}  # This may ask, so it comes first.
-            self._queue.append((SharePairing(self._next_number(), arrays), None))
+            # This may ask, so it comes first.
+            arrays = {name: wire.PackedArray.pack(array) for name, array in item.items()}
+            self._queue.append((wire.SharePairing(self._next_number(), arrays), None))
             if sum(len(array.data) for array in arrays.values()) > _LARGE:
                 self._forgotten.append(self._number)
                 return self._number
         else:
             meshes = item.nodes, item.slave.faces, item.master.faces
-            self._queue.append((ShareInterface(self._next_number(), *map(PackedArray.pack, meshes)), None))
+            self._queue.append((wire.ShareInterface(self._next_number(), *map(wire.PackedArray.pack, meshes)), None))
         self._shelf[id(item)] = item, self._number
         if len(self._shelf) > _SHELF:
             _, (_, oldest) = self._shelf.popitem(last=False)
@@ -228,7 +211,7 @@ class Host:
         waiting, self._queue = self._queue, []
         questions = [question for _, question in waiting if question is not None]
         if len(self._forgotten) > _FORGET:
-            waiting.append((Forget(self._forgotten), None))  # At the end, for a question that waits may need it.
+            waiting.append((wire.Forget(self._forgotten), None))  # At the end, for a question that waits may need it.
             self._forgotten = []
         process = self._process
         is_answered = process is None and not questions
@@ -255,17 +238,19 @@ class Host:
                 question.answer = question.answer or failure
         return is_answered
 
-    def _exchange(self, process: PluginProcess, waiting: list[tuple[Request | Solve, Question | None]]) -> None:
+    def _exchange(
+        self, process: PluginProcess, waiting: list[tuple[wire.Request | wire.Solve, Question | None]]
+    ) -> None:
         """Send requests and receive the answers: together what is small and quick, else one question after another.
 
         A first call may take longer, by as much as the same one took in an earlier process.
         """
         verbs = {question.verb for _, question in waiting if question is not None}
-        most = MOST_QUESTIONS if self._is_quick and verbs <= self._known_verbs else 1
+        most = wire.MOST_QUESTIONS if self._is_quick and verbs <= self._known_verbs else 1
         messages: list[tuple[list[bytes], list[Question]]] = [([], [])]
         size = 0
         for request, question in waiting:
-            frame = encode(request)
+            frame = wire.encode(request)
             frames, questions = messages[-1]
             is_full = question is not None and len(questions) >= most
             if frames and (is_full or size + len(frame) > _TOGETHER):
@@ -278,7 +263,7 @@ class Host:
             limit, start, verb = self._limits.seconds, monotonic(), questions[0].verb if questions else ""
             if verb not in self._known_verbs:
                 limit = min(limit + self._first_seconds.get(verb, inf), self._limits.start_seconds)
-            process.ask(join(frames), questions, limit)
+            process.ask(wire.join(frames), questions, limit)
             seconds = monotonic() - (self._load_began if verb == "import" else start)
             if questions:
                 self._is_quick = seconds <= max(_QUICK, _QUICK_EACH * len(questions)) * self._limits.seconds
@@ -300,22 +285,22 @@ class Host:
         self._loading = None
 
 
-def answer_of(question: Question) -> Answer:
+def answer_of(question: Question) -> wire.Answer:
     """Return the answer to a question, or raise the ContractError that came instead of it."""
     answer = question.answer
-    if not isinstance(answer, Answer):
+    if not isinstance(answer, wire.Answer):
         raise_failure(question)
         raise PluginError(f"{question.verb}: the reply of an engine", "channel")
     return answer
 
 
-def raise_failure(question: Question) -> Reply:
+def raise_failure(question: Question) -> wire.Reply:
     """Return the reply to a question, or raise the ContractError that it tells of; a MisuseError is its cause."""
     reply = question.answer
     assert reply is not None
     if isinstance(reply, PluginError):
         raise PluginError(str(reply), reply.cause, ended=reply.ended)
-    if not isinstance(reply, Failure):
+    if not isinstance(reply, wire.Failure):
         return reply
     words = [one_line(text) for text in reply.words[:3]] or ["no words"]
     match reply.kind:

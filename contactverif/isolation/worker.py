@@ -30,36 +30,8 @@ from contactverif.contract.formulation import ContactPoints, Pairing
 from contactverif.contract.interface import Interface, Surface
 from contactverif.contract.result import NotLoaded
 from contactverif.contract.subject import CheckedFormulation, Subject, _call_plugin, _check_forces, copy_entries
-from contactverif.isolation.child import (
-    FORKS,
-    Channel,
-    Child,
-    ClosedError,
-    TooLargeError,
-    name_of_signal,
-    socket_of_parent,
-)
+from contactverif.isolation import child, wire
 from contactverif.isolation.confine import PROCESSES, PROGRESS, SOCKET, confine, die_with_parent, hide_memory
-from contactverif.isolation.wire import (
-    Answer,
-    Ask,
-    Failure,
-    Forget,
-    Load,
-    Loaded,
-    Make,
-    MessageError,
-    PackedArray,
-    Reply,
-    Request,
-    ShareInterface,
-    SharePairing,
-    Unloaded,
-    Wraps,
-    decode_replies,
-    decode_requests,
-    encode,
-)
 
 METHODS = frozenset({"pair", "residual", "tangent", "residual_and_tangent"})
 _SHORT = 1e-3  # Seconds. Other processes have used the caches before a call, so a shorter one is timed when repeated.
@@ -76,21 +48,21 @@ Loader = Callable[[str], Any]  # {name: a `Subject`, a `NotLoaded`, or a `Wrappe
 def main(load: Loader, survey: Loader) -> None:
     """Answer the judge until it is gone. `survey` loads a name with the defaults of its options, also of a wrapper."""
     confine()
-    channel, handler = Channel(socket_of_parent()), RequestHandler(load, survey)
+    channel, handler = child.Channel(child.socket_of_parent()), RequestHandler(load, survey)
     progress = mmap.mmap(int(os.environ[PROGRESS]), 1)
     while True:
         try:
             data = channel.receive()
-        except ClosedError:
+        except child.ClosedError:
             os._exit(0)  # What a plugin wants to do at the end of its process is not waited for.
-        replies: list[Reply] = []
-        for request in decode_requests(data):
+        replies: list[wire.Reply] = []
+        for request in wire.decode_requests(data):
             progress[0] = len(replies)  # So the judge knows which call has ended this process.
             reply = handler.reply(request)
             if reply is not None:
                 replies.append(reply)
         if replies:
-            channel.send(encode(replies))
+            channel.send(wire.encode(replies))
 
 
 class RequestHandler:
@@ -101,17 +73,17 @@ class RequestHandler:
         self._subject: Subject | None = None
         self._store: dict[int, Any] = {}
 
-    def reply(self, request: Request) -> Reply | None:
+    def reply(self, request: wire.Request) -> wire.Reply | None:
         """Return the reply to a request; None if it has none."""
-        if isinstance(request, Load | Ask):
+        if isinstance(request, wire.Load | wire.Ask):
             try:
-                if isinstance(request, Ask):
+                if isinstance(request, wire.Ask):
                     return self._ask(request)
                 describe = partial(self._describe, request)
-                return _survey_in_copy(describe, request.question) if request.survey and FORKS else describe()
+                return _survey_in_copy(describe, request.question) if request.survey and child.FORKS else describe()
             except BaseException as error:  # A plugin may raise what it likes, and may have changed what we call.
                 return _failure(request.question, error)
-        if isinstance(request, Forget):
+        if isinstance(request, wire.Forget):
             for number in request.numbers:
                 self._store.pop(number, None)
             return None
@@ -123,16 +95,16 @@ class RequestHandler:
             self._store[request.number] = error
         return None
 
-    def _item(self, request: Make | ShareInterface | SharePairing) -> Any:
+    def _item(self, request: wire.Make | wire.ShareInterface | wire.SharePairing) -> Any:
         match request:
-            case Make(_, penalty):
+            case wire.Make(_, penalty):
                 assert self._subject is not None
                 formulation = self._subject.with_penalty(penalty)
                 formulation.plugin, formulation.copy_matrix = Stopwatch(formulation.plugin), _keep_compressed
                 return formulation
-            case ShareInterface(_, nodes, slave, master):
+            case wire.ShareInterface(_, nodes, slave, master):
                 return Interface.of_parts(nodes.unpack(), Surface(slave.unpack()), Surface(master.unpack()))
-            case SharePairing(_, arrays):
+            case wire.SharePairing(_, arrays):
                 return Pairing({name: array.unpack() for name, array in arrays.items()})
 
     def _get(self, number: int) -> Any:
@@ -141,24 +113,24 @@ class RequestHandler:
             raise item
         return item
 
-    def _describe(self, request: Load) -> Reply:
+    def _describe(self, request: wire.Load) -> wire.Reply:
         item = self._loaders[request.survey](request.name)
         if isinstance(item, NotLoaded):
-            return Unloaded(request.question, item.reason)
+            return wire.Unloaded(request.question, item.reason)
         if not isinstance(item, Subject):
-            return Wraps(request.question, str(item.summary), str(item.form))
+            return wire.Wraps(request.question, str(item.summary), str(item.form))
         self._subject = item
         methods = item.provides | ({"n_multipliers"} if item.counts_multipliers else set())
         traits = msgspec.to_builtins(item.traits, enc_hook=_plain)
-        return Loaded(request.question, traits, sorted(methods))
+        return wire.Loaded(request.question, traits, sorted(methods))
 
-    def _ask(self, ask: Ask) -> Reply:
+    def _ask(self, ask: wire.Ask) -> wire.Reply:
         formulation: CheckedFormulation = self._get(ask.formulation)
         watch: Stopwatch = formulation.plugin
         interface: Interface = self._get(ask.interface)
         count = formulation.n_multipliers(interface)  # It is known from now on, so no call is timed with it.
         if ask.method == "n_multipliers":
-            return Answer(ask.question, {}, 0.0, 0, count)
+            return wire.Answer(ask.question, {}, 0.0, 0, count)
         assert ask.z is not None
         arguments = interface, None if ask.pairing is None else self._get(ask.pairing), ask.z.unpack()
         watch.runs, watch.counts = ask.timed, ask.counted
@@ -174,7 +146,7 @@ class RequestHandler:
             if not ask.timed or watch.seconds > _SHORT:
                 break
         handle = ask.method == "pair" and answer.opaque
-        return Answer(ask.question, _pack(ask.method, answer), watch.seconds, watch.calls, handle=handle)
+        return wire.Answer(ask.question, _pack(ask.method, answer), watch.seconds, watch.calls, handle=handle)
 
 
 def _residual(formulation: CheckedFormulation, interface: Interface, pairing: Any, z: Any) -> Any:
@@ -237,9 +209,9 @@ class Stopwatch:
         return call
 
 
-def _pack(method: str, answer: Any) -> dict[str, PackedArray]:
+def _pack(method: str, answer: Any) -> dict[str, wire.PackedArray]:
     try:
-        return {name: PackedArray.pack(array) for name, array in _ARRAYS[method](answer).items()}
+        return {name: wire.PackedArray.pack(array) for name, array in _ARRAYS[method](answer).items()}
     except ValueError as error:
         raise ContractError(f"{method}: returned {error}") from None
 
@@ -271,37 +243,37 @@ def _keep_compressed(verb: str, tangent: Any) -> Any:
     return copy_entries(verb, tangent)
 
 
-def _failure(question: int, error: BaseException) -> Failure:
+def _failure(question: int, error: BaseException) -> wire.Failure:
     match error:
         case PluginError():
-            return Failure(question, "plugin", error.cause, (str(error),))
+            return wire.Failure(question, "plugin", error.cause, (str(error),))
         case NonFiniteError():
-            return Failure(question, "not finite", "exception", (str(error),))
+            return wire.Failure(question, "not finite", "exception", (str(error),))
         case ContractError():
-            return Failure(question, "contract", "exception", (str(error),))
+            return wire.Failure(question, "contract", "exception", (str(error),))
         case MisuseError():
-            return Failure(question, "misuse", "exception", (error.argument, error.found, error.needed))
-    return Failure(question, "plugin", "exception", (f"its process: {describe_error(error)}",))
+            return wire.Failure(question, "misuse", "exception", (error.argument, error.found, error.needed))
+    return wire.Failure(question, "plugin", "exception", (f"its process: {describe_error(error)}",))
 
 
-def _survey_in_copy(describe: Callable[[], Reply], question: int) -> Reply:
+def _survey_in_copy(describe: Callable[[], wire.Reply], question: int) -> wire.Reply:
     """Return the reply of a copy of this process, which no other plugin has changed, or how the copy ended."""
     hide_memory(hidden=True)
     for name in ("contactverif.geometry.projection", "scipy.sparse"):
         import_module(name)  # What most plugins import is imported once.
     _end_what_is_left()
     before = _state()
-    copy = Child.fork(partial(_send_description, describe, question), _LARGEST_SURVEY)
+    copy = child.Child.fork(partial(_send_description, describe, question), _LARGEST_SURVEY)
     try:
-        (reply,) = decode_replies(copy.channel.receive(), loading=True)
-    except ClosedError:
+        (reply,) = wire.decode_replies(copy.channel.receive(), loading=True)
+    except child.ClosedError:
         status = copy.wait() or 0
         words = f"its process ended with status {status}"
         if status < 0:
-            words = f"{name_of_signal(-status)} ended its process"
-        return Failure(question, "plugin", "exit", (f"import: {words}",))
-    except (TooLargeError, MessageError, ValueError) as error:
-        return Failure(question, "plugin", "channel", (f"import: {error}",))
+            words = f"{child.name_of_signal(-status)} ended its process"
+        return wire.Failure(question, "plugin", "exit", (f"import: {words}",))
+    except (child.TooLargeError, wire.MessageError, ValueError) as error:
+        return wire.Failure(question, "plugin", "channel", (f"import: {error}",))
     else:
         return reply
     finally:
@@ -314,15 +286,15 @@ def _survey_in_copy(describe: Callable[[], Reply], question: int) -> Reply:
             os._exit(_CHANGED)
 
 
-def _send_description(describe: Callable[[], Reply], question: int, channel: Channel) -> None:
+def _send_description(describe: Callable[[], wire.Reply], question: int, channel: child.Channel) -> None:
     os.close(int(os.environ[SOCKET]))  # The line of the process that was copied.
     hide_memory(hidden=False)  # A plugin may want to look at itself.
     die_with_parent()
     try:
         reply = describe()
     except BaseException as error:  # A plugin may raise anything.
-        reply = Failure(question, "plugin", "exception", (f"import: {describe_error(error)}",))
-    channel.send(encode([reply]))
+        reply = wire.Failure(question, "plugin", "exception", (f"import: {describe_error(error)}",))
+    channel.send(wire.encode([reply]))
 
 
 def _end_what_is_left() -> None:

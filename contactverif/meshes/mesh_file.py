@@ -266,11 +266,7 @@ def _chain_words(option: str, points: FloatArray, lines: IntArray, neighbours: l
 
 
 def _run_one_way(
-    argument: str,
-    points: FloatArray,
-    elements: IntArray,
-    neighbours: list[list[tuple[int, bool]]],
-    signs: IntArray,
+    argument: str, points: FloatArray, elements: IntArray, neighbours: list[list[tuple[int, bool]]], signs: IntArray
 ) -> tuple[IntArray, BoolArray]:
     """Turn lines or faces (n, n_corners) as those that they hang together with, and so that the body is behind them.
 

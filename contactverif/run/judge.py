@@ -15,14 +15,7 @@ from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.errors import ContractError, NonFiniteError, PluginError, describe_error, place_of_error
 from contactverif.contract.interface import PLANE
-from contactverif.contract.property import (
-    Outcome,
-    Property,
-    PropertyInfo,
-    Verdict,
-    checked_numbers,
-    judge,
-)
+from contactverif.contract.property import Outcome, Property, PropertyInfo, Verdict, checked_numbers, judge
 from contactverif.contract.result import JUDGED_SHARE, OPPOSITE_SIGN, NodalForces, Row, exceeds
 from contactverif.contract.subject import EngineSubject, FirstAnswers, Subject, ask_first
 from contactverif.contract.traits import Traits

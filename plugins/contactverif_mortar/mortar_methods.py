@@ -25,13 +25,7 @@ from contactverif.geometry.block_rows import Couplings, zero_matrix
 from contactverif_mortar.cell_frame import ForcesAndTangent, NodeState, node_rows, weigh
 from contactverif_mortar.integration_cells import AREAS, CELL_TRAITS, Cells, Quadrature, near, report_nodes
 from contactverif_mortar.node_factors import Factors, NodeRows, RowGroups, check_product, group_nodes
-from contactverif_mortar.shape_rows import (
-    Weighted,
-    add_shaped_rows,
-    divide_covered,
-    own_lengths,
-    weigh_points,
-)
+from contactverif_mortar.shape_rows import Weighted, add_shaped_rows, divide_covered, own_lengths, weigh_points
 
 # ∫φ_j and ∫φ_j g (n_slave_nodes,) at one state, and the shapes: their numbers, or at points.
 StateWeights = tuple[FloatArray, FloatArray, FloatArray | Weighted]
