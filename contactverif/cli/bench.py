@@ -16,8 +16,8 @@ from contactverif.isolation.confine import ONE_THREAD
 from contactverif.plugins.registry import load_formulation
 from contactverif.run.journal import journal_folder, remove_journal
 from contactverif.run.run_options import RunOptions
+from contactverif.studies.bench_cells import run_bench
 from contactverif.studies.bench_plan import BenchPlan, make_plan
-from contactverif.studies.bench_study import run_bench
 from contactverif_reports import bench_costs
 from contactverif_reports.bench_results import BenchResults, Outcome
 from contactverif_reports.files import whole

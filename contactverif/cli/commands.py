@@ -3,8 +3,6 @@
 Rule: this file imports nothing that takes long, because every `--help` imports it. A module is imported when it works.
 """
 
-from __future__ import annotations
-
 from contextlib import suppress
 from pathlib import Path
 from typing import Annotated

@@ -1,7 +1,5 @@
 """The work of `compare`: formulations against a reference, on the same cases; or an old report and a new one."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from concurrent.futures import Executor
 from contextlib import ExitStack

@@ -1,7 +1,5 @@
 """The work of `list` (what is installed, and what formulations state) and of `scenes`, with their options."""
 
-from __future__ import annotations
-
 import textwrap
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import fields

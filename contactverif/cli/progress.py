@@ -5,15 +5,13 @@ does not answer. Python drops an interrupt that arrives in a callback of the gar
 without the bar such a run would go on to its end.
 """
 
-from __future__ import annotations
-
 import os
 import signal
 import sys
 import threading
 from time import monotonic
 from types import FrameType, TracebackType
-from typing import Any
+from typing import Any, Self
 
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, Task, TaskID, TextColumn, TimeElapsedColumn
 from rich.table import Column
@@ -67,7 +65,7 @@ class Bar:
         self._next_line = self._since + _PAUSE
         self._previous_handlers: dict[int, Any] = {}
 
-    def __enter__(self) -> Bar:
+    def __enter__(self) -> Self:
         if threading.current_thread() is threading.main_thread():  # Python allows signal handlers in no other thread.
             for number in (signal.SIGINT, signal.SIGTERM):
                 self._previous_handlers[number] = signal.signal(number, self._interrupt)

@@ -4,8 +4,6 @@ A screen needs no more than 80 columns. In few lines each formulation has what b
 telling mesh, then what fails without one, what fails as stated, and the families of what passes.
 """
 
-from __future__ import annotations
-
 import shlex
 import textwrap
 from collections.abc import Collection, Iterator, Mapping, Sequence

@@ -3,8 +3,6 @@
 What a plugin may keep or change must not be what others are judged on: arrays go to it and come from it as copies.
 """
 
-from __future__ import annotations
-
 from collections.abc import Collection
 from copy import copy
 from functools import cache, lru_cache

@@ -5,8 +5,6 @@ Whatever can be wrong with a body is found here, in the constructor, once. What 
 roller on an inclined side is a fixed component like any other.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Any

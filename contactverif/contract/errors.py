@@ -6,8 +6,6 @@ is clean. The terminal, pages and figures call `printable` as the last guard. No
 that a plugin made, but for `str(error)`, which may raise.
 """
 
-from __future__ import annotations
-
 import difflib
 import re
 from collections.abc import Iterable

@@ -16,8 +16,6 @@ hashed, so that a store keeps it once, and written as JSON or MessagePack, from 
 numbers are floats, NaN and −0.0 included: `array("d", numbers)` holds them.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, is_dataclass
 from enum import Enum

@@ -31,8 +31,7 @@ from contactverif.contract.errors import (
     place_of_error,
 )
 from contactverif.contract.formulation import ContactPoints, Pairing
-from contactverif.contract.interface import PLANE, Interface
-from contactverif.contract.reach import find_depth
+from contactverif.contract.interface import PLANE, Interface, find_depth
 from contactverif.contract.traits import PatchPromises, Promises, Rules, Traits
 
 _Value = TypeVar("_Value")

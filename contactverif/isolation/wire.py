@@ -5,14 +5,12 @@ comes from its process is decoded by these schemas and by `PackedArray.unpack` a
 memory here than a few times its bytes: lists and mappings, whose entries take more, have a longest length.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Sequence
 from contextlib import suppress
 from functools import lru_cache
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
 import msgspec
 import numpy as np
@@ -37,7 +35,7 @@ class PackedArray(msgspec.Struct, array_like=True, frozen=True):
     data: bytes  # A copy, for an array inside a message would not lie where compiled code wants it.
 
     @classmethod
-    def pack(cls, values: Any, name: str = "an array") -> PackedArray:
+    def pack(cls, values: Any, name: str = "an array") -> Self:
         """Return an array of numbers or characters, packed, or raise a ValueError that begins with its name."""
         if type(values) is np.ndarray and (text := values.dtype.str) in _USUAL and values.ndim <= MOST_AXES:
             return cls(text, values.shape, values.tobytes())

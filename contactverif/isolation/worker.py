@@ -5,8 +5,6 @@ likes, so the judge checks every answer again. What cannot travel is checked her
 into, so that an error has the same words as in the judge's own process.
 """
 
-from __future__ import annotations
-
 import mmap
 import os
 import shutil
@@ -20,7 +18,7 @@ from functools import partial
 from importlib import import_module
 from time import perf_counter
 from types import FrameType
-from typing import Any
+from typing import Any, Self
 
 import msgspec
 import numpy as np
@@ -174,7 +172,7 @@ class MethodCalls:
         self.count = 0
         self._before: Any = None
 
-    def __enter__(self) -> MethodCalls:
+    def __enter__(self) -> Self:
         self._before = sys.getprofile()
         sys.setprofile(self._see)
         return self

@@ -6,7 +6,7 @@ import numpy as np
 
 from contactverif.contract.arrays import FloatArray, IntArray
 from contactverif.contract.errors import MisuseError
-from contactverif.contract.interface import ONE_SIDED, Interface, Surface, turns_of
+from contactverif.contract.interface import ONE_SIDED, Interface, Surface, turns_of, unit_normals
 
 _RAYS = 50  # So many elements of a surface look behind them.
 
@@ -60,9 +60,9 @@ def back_to_back(points: FloatArray, slave: IntArray, master: IntArray, boundary
         ends behind an element as far away as the element is wide.
     """
     master, boundary = _simplices(master), _simplices(boundary)
-    of_master, of_boundary = _normals(points[master]), _normals(points[boundary])
+    of_master, of_boundary = unit_normals(points[master]), unit_normals(points[boundary])
     rays = slave[np.unique(np.linspace(0, len(slave) - 1, _RAYS).astype(np.int64))]
-    origins, normals = points[rays].mean(axis=1), _normals(points[_simplices(rays)[: len(rays)]])
+    origins, normals = points[rays].mean(axis=1), unit_normals(points[_simplices(rays)[: len(rays)]])
     votes, places = 0, ""
     for origin, normal, element in zip(origins, normals, rays, strict=True):
         ways = _ways(origin, normal, points[master])[of_master @ normal < 0]
@@ -87,18 +87,6 @@ def describe(place: FloatArray) -> str:
 def _simplices(elements: IntArray) -> IntArray:
     """Return lines, and faces as triangles: first a triangle of each face, then the other ones of quadrilaterals."""
     return np.vstack([elements[:, :3], elements[:, [0, 2, 3]]]) if elements.shape[1] == 4 else elements
-
-
-def _normals(corners: FloatArray) -> FloatArray:
-    """Return the unit normals (n, dim) out of the body of lines (n, 2, 2) or triangles (n, 3, 3)."""
-    if corners.shape[2] == 2:
-        along = corners[:, 1] - corners[:, 0]
-        normals = np.column_stack([along[:, 1], -along[:, 0]])
-    else:
-        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    lengths = np.linalg.norm(normals, axis=1)[:, None]
-    units: FloatArray = normals / np.where(lengths > 0, lengths, 1.0)  # A boundary may have sides without an area.
-    return units
 
 
 def _ways(origin: FloatArray, direction: FloatArray, corners: FloatArray) -> FloatArray:

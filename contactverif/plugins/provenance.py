@@ -1,7 +1,5 @@
 """The origin of a run: versions, commit, machine, time and command for a report, digests of code for a journal."""
 
-from __future__ import annotations
-
 import json
 import platform
 import shlex

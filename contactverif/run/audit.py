@@ -1,7 +1,5 @@
 """The audit of a stored run: each verdict follows again from its numbers, and a share of the cases is judged again."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cache

@@ -3,13 +3,12 @@
 The union of the stores of all shards is the store of a run, with which `merge` goes on.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, fields
 from pathlib import Path
+from typing import Self
 
 import msgspec
 
@@ -30,7 +29,7 @@ class Shard:
     number: int
 
     @classmethod
-    def parse(cls, text: str) -> Shard:
+    def parse(cls, text: str) -> Self:
         """Return the shard of a text I/N."""
         match = re.fullmatch(r"([0-9]{1,9})/([0-9]{1,9})", text)
         shard = cls(int(match[2]), int(match[1])) if match else None

@@ -5,8 +5,6 @@ is a length, a CRC-32 and a message of MessagePack, decoded by a schema: a journ
 At every moment, even if the process is killed, the folder has its whole header, or it is not there.
 """
 
-from __future__ import annotations
-
 import errno
 import os
 import re

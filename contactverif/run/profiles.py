@@ -3,11 +3,9 @@
 `dev` draws new cases in every run, `ci` the same cases every time, `nightly` twenty times as many.
 """
 
-from __future__ import annotations
-
 import secrets
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Literal, Self
 
 from contactverif.contract.errors import MisuseError, unknown_name_error
 
@@ -25,7 +23,7 @@ class Profile:
     examples: int  # The number of planned cases of each property.
     seed: int | None  # The seed of all cases; None means a fresh seed in every run.
 
-    def resolve(self, *, examples: int | None = None, seed: int | None = None, fresh: int | None = None) -> Profile:
+    def resolve(self, *, examples: int | None = None, seed: int | None = None, fresh: int | None = None) -> Self:
         """Return the profile with the numbers of the user, and the seed of either, else the fresh one, or a new one."""
         examples = self.examples if examples is None else examples
         seed = self.seed if seed is None else seed

@@ -7,8 +7,6 @@ planned cases of a row are judged before one is shrunk, so that a failure ends n
 first round has is not judged again, and a block is not drawn if the store has all of it.
 """
 
-from __future__ import annotations
-
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor

@@ -4,8 +4,6 @@ Verdicts are never read: they follow from the stored numbers. A random share of 
 stored outcomes count (`recheck_store`).
 """
 
-from __future__ import annotations
-
 import os
 import shlex
 from array import array

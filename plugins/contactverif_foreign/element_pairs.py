@@ -3,8 +3,6 @@
 What is chosen here is all that the harness decides. Whether an element is in contact it decides itself.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

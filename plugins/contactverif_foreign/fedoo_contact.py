@@ -4,8 +4,6 @@ The search gives a list of pairs of a slave node and a master element, which fed
 increment. This list is the pairing. Forces and stiffness are then those of the class `Contact`.
 """
 
-from __future__ import annotations
-
 import warnings
 from importlib.util import find_spec
 from math import inf

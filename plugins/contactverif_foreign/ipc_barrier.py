@@ -4,8 +4,6 @@ The library finds its collisions at each state, so a pairing is a `Handle`. Its 
 shortest segment in the reference configuration.
 """
 
-from __future__ import annotations
-
 from importlib.util import find_spec
 from typing import Any
 

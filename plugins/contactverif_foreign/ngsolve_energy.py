@@ -5,8 +5,6 @@ Both are then fixed, so that forces and stiffness are the derivatives of that en
 pairing is a `Handle`. A surface needs cells behind it, on which nothing depends, and each segment gets a triangle.
 """
 
-from __future__ import annotations
-
 from importlib.util import find_spec
 from math import inf
 from typing import Any, NamedTuple

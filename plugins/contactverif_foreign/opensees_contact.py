@@ -5,8 +5,6 @@ against the master segments, and one at each master node against the slave segme
 friction it has no history.
 """
 
-from __future__ import annotations
-
 from importlib.util import find_spec
 from typing import Any
 

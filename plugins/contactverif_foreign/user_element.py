@@ -7,8 +7,6 @@ of the decisions, and it travels in a `Handle`: the harness pairs anew at each s
 - FEAP calls `elmtNN(d, ul, xl, ix, tl, s, p, ndf, ndm, nst, isw)`. `p` is minus the residual, `s` its derivative.
 """
 
-from __future__ import annotations
-
 import ctypes
 import struct
 from collections.abc import Iterable

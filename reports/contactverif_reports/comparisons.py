@@ -3,13 +3,11 @@
 Numbers alone: nothing is judged, solved or timed here. It does not matter whether a row comes from memory or a file.
 """
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import inf, isnan, nan
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -43,7 +41,7 @@ class RowNumbers:
     seconds: float
 
     @classmethod
-    def from_row(cls, row: Row) -> RowNumbers:
+    def from_row(cls, row: Row) -> Self:
         """Return the numbers of a row, collected in one pass over its cases."""
         facts = [_facts(row.info, outcome) for outcome in row.outcomes]
         verdicts, margins, orders, details, numbers, kinds, seconds = zip(*facts, strict=True) if facts else [()] * 7
@@ -129,7 +127,7 @@ class Pair:
     apart: BoolArray  # (n_cases,) One passes and the other does not.
 
     @classmethod
-    def from_cells(cls, new: RowNumbers, old: RowNumbers) -> Pair:
+    def from_cells(cls, new: RowNumbers, old: RowNumbers) -> Self:
         """Compare the margins of two rows case by case."""
         n_cases = min(len(new.verdicts), len(old.verdicts))
         a, b = new.standing[:n_cases], old.standing[:n_cases]
@@ -244,7 +242,7 @@ class Comparison:
     provenance: Mapping[str, str]  # Where the run comes from.
 
     @classmethod
-    def from_run(cls, run: Run, reference: str) -> Comparison:
+    def from_run(cls, run: Run, reference: str) -> Self:
         """Compare the formulations of a run with one of them."""
         cells = {key: RowNumbers.from_row(row) for key, row in run.row_of.items()}
         candidates = [name for name in dict.fromkeys(name for name, _ in cells) if name != reference]

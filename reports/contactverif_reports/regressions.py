@@ -27,12 +27,11 @@ Worth a look, though nothing got worse by it, is a row on the same cases where
   may be one roundoff (0.05 where a tolerance is 20 of them), which comes and goes.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import isfinite, log, nan, sqrt
 from textwrap import shorten
+from typing import Self
 
 import numpy as np
 
@@ -77,7 +76,7 @@ class NamedRun:
     cells: Mapping[tuple[str, str], RowNumbers]  # {(formulation, property): numbers}.
 
     @classmethod
-    def from_run(cls, path: str, run: Run) -> NamedRun:
+    def from_run(cls, path: str, run: Run) -> Self:
         """Collect the numbers of a run."""
         return cls(path, run, {key: RowNumbers.from_row(row) for key, row in run.row_of.items()})
 
@@ -122,7 +121,7 @@ class Changes:
         )
 
     @classmethod
-    def between(cls, old: NamedRun, new: NamedRun) -> Changes:
+    def between(cls, old: NamedRun, new: NamedRun) -> Self:
         """Compare the rows that both runs have; none if they have nothing in common."""
         same = {key: old.run.provenance.get(key) == new.run.provenance.get(key) for key in ("seed", "examples")}
         names = (*old.run.formulations, *old.run.properties)

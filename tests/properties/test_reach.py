@@ -10,8 +10,8 @@ from zoo.on_strips import SegmentPenalty
 
 from contactverif import Interface, Subject, Verdict, named_case
 from contactverif.contract.errors import PluginError
+from contactverif.contract.interface import find_depth
 from contactverif.contract.property import TOO_DEEP
-from contactverif.contract.reach import find_depth
 from contactverif.problems.flat_states import deep_face_states, deep_states
 from contactverif.run.run import run
 

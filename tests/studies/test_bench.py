@@ -40,9 +40,16 @@ from contactverif.plugins.registry import load_formulation, load_problems
 from contactverif.problems.problem import FORCES, MOTIONS, PRESSURE, Problem, ProblemInstance, Variation
 from contactverif.run.journal import RecordFile, journal_folder, read_messages, record_files
 from contactverif.studies import bench_plan
-from contactverif.studies.bench_cells import CellRecord, RunRecord, SolutionRecord, run_cell
+from contactverif.studies.bench_cells import (
+    CellRecord,
+    Header,
+    RunRecord,
+    SolutionRecord,
+    open_journal,
+    run_bench,
+    run_cell,
+)
 from contactverif.studies.bench_plan import BenchPlan, largest_errors, make_plan, pose, vary
-from contactverif.studies.bench_study import Header, open_journal, run_bench
 from contactverif_mortar import segment_to_segment
 from contactverif_reports.bench_results import COUNTS, RULE, VARIANTS, Cell, Outcome
 from contactverif_reports.netcdf.bench_file import read_bench, write_bench

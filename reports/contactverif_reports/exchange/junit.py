@@ -4,8 +4,6 @@ A row that makes the run fail is a failure, or an error where the plugin crashed
 reason, and so is what fails as stated or without a promise: a server shows it neither as a failure nor as a success.
 """
 
-from __future__ import annotations
-
 import os
 from xml.etree.ElementTree import Element, ElementTree, SubElement, indent
 

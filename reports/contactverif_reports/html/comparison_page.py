@@ -1,7 +1,5 @@
 """The pages of a comparison: formulations against a reference, and an old report against a new one."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import inf

@@ -1,7 +1,5 @@
 """The HTML page of a run: results, distributions, the smallest meshes that fail, provenance. Nothing is solved here."""
 
-from __future__ import annotations
-
 import os
 from collections import Counter
 from collections.abc import Mapping, Sequence
