@@ -20,9 +20,8 @@ from contactverif.contract.subject import Subject
 from contactverif.isolation.host import end_all
 from contactverif.isolation.limits import Limits
 from contactverif.plugins.registry import load_formulation, load_properties
-from contactverif.run.profiles import Profile, Shrink
 from contactverif.run.run import run
-from contactverif.run.run_options import Isolation, RunOptions
+from contactverif.run.run_options import Isolation, Profile, RunOptions, Shrink
 from contactverif.run.scheduler import Progress
 
 _FORMULATIONS = "a name, a class or factory make(*, penalty), an instance with `residual`, a Subject, or a list"

@@ -14,8 +14,7 @@ from contactverif.contract.counterexample import Counterexample, counterexamples
 from contactverif.contract.errors import MisuseError, unknown_name_error
 from contactverif.contract.result import Run
 from contactverif.explanations import terms
-from contactverif.explanations.case_numbers import case_text
-from contactverif.explanations.property_text import property_text, stated_failures
+from contactverif.explanations.property_text import case_text, property_text, stated_failures
 from contactverif.plugins.registry import load_formulations, property_ids, the_property
 from contactverif.problems.named_states import NAMED, named_case
 from contactverif.run.run_options import RunOptions

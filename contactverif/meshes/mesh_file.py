@@ -15,8 +15,7 @@ import numpy as np
 from contactverif.contract.arrays import BoolArray, FloatArray, IntArray
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.interface import SEGMENT, Interface, Surface
-from contactverif.meshes.cell_sides import CellSides, label_bodies
-from contactverif.meshes.facing import back_to_back, check_facing, describe, mean_direction
+from contactverif.meshes.cell_sides import CellSides, back_to_back, check_facing, describe, label_bodies, mean_direction
 from contactverif.meshes.plain_mesh import CORNERS, PlainMesh, find_group, read_mesh
 
 Flip = Literal["slave", "master", "both"]

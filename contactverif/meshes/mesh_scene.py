@@ -19,8 +19,7 @@ from contactverif.contract.errors import MisuseError
 from contactverif.contract.interface import ONE_SIDED, Surface, mean_normal, ways_to_master
 from contactverif.mechanics.bodies import turn_counter_clockwise
 from contactverif.mechanics.scene import Scene
-from contactverif.meshes.cell_sides import label_bodies, plane_cells
-from contactverif.meshes.facing import describe
+from contactverif.meshes.cell_sides import describe, label_bodies, plane_cells
 from contactverif.meshes.mesh_file import Flip, MeshSides, read_sides
 from contactverif.meshes.plain_mesh import find_group
 

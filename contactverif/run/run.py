@@ -32,7 +32,6 @@ from contactverif.plugins.provenance import collect_provenance
 from contactverif.plugins.registry import files_within, unknown_property_error
 from contactverif.run import judge
 from contactverif.run.failure_memory import Failures
-from contactverif.run.profiles import FIRST_CASES, Profile, Shrink, profile_named
 from contactverif.run.ranking import first_failure, wrong_rows
 from contactverif.run.recheck import recheck_store
 from contactverif.run.rows import (
@@ -45,6 +44,7 @@ from contactverif.run.rows import (
     row_of_case,
     shrink_case,
 )
+from contactverif.run.run_options import FIRST_CASES, Profile, Shrink, profile_named
 from contactverif.run.scheduler import CaseChunk, Job, Phase, Progress, RunProgress, Scheduler, in_words
 from contactverif.run.store import WITNESS, Store
 from contactverif.sampling import draw

@@ -16,8 +16,8 @@ from contactverif.contract.property import Outcome, Property, PropertyInfo, Verd
 from contactverif.contract.result import OPPOSITE_SIGN, NotLoaded, Row
 from contactverif.contract.subject import Subject
 from contactverif.plugins.registry import load_formulation, load_properties, subject_of
-from contactverif.run.profiles import Profile, profile_named
 from contactverif.run.run import check_known, run
+from contactverif.run.run_options import Profile, profile_named
 from contactverif_reports.plot.text import as_text
 
 

@@ -11,7 +11,7 @@ from contactverif import Case, Interface, Property, Quantity
 from contactverif.contract.counterexample import Counterexample
 from contactverif.contract.property import Measurement, Outcome, PropertyInfo, Verdict
 from contactverif.contract.result import Row
-from contactverif.explanations.case_numbers import case_text, put_in, symbol_numbers, symbols_of, value_of
+from contactverif.explanations.property_text import case_text, put_in, symbol_numbers, symbols_of, value_of
 from contactverif.explanations.terms import symbol_meanings
 
 SPELLED = (

@@ -20,8 +20,8 @@ from contactverif.contract.counterexample import Origin, counterexamples
 from contactverif.contract.property import Measurement, Quantity
 from contactverif.contract.result import NotLoaded, Result, Row, Run
 from contactverif.contract.traits import Traits
-from contactverif.run.profiles import PROFILES
 from contactverif.run.run import run
+from contactverif.run.run_options import PROFILES
 from contactverif.run.scheduler import Progress
 
 ERROR = Quantity("error", "1e-6", "a number for a test")
