@@ -151,13 +151,9 @@ class JaxFormulation:
         n_elements = len(pairing["nodes"])
         if n_elements == 0:
             return np.empty(0)
-        rows = np.arange(_bucket(n_elements)) % n_elements  # What pads is a copy of elements that are there.
+        n_computed = max(_SMALLEST_BUCKET, 1 << (n_elements - 1).bit_length())  # A power of two, and not too small.
+        rows = np.arange(n_computed) % n_elements  # What pads is a copy of elements that are there.
         decisions = {name: values[rows] for name, values in pairing.items()}
         nodes = decisions.pop("nodes")
         x, reference = z.reshape(-1, interface.dim)[nodes], interface.nodes[nodes]
         return np.asarray(function(x, reference, decisions, self._penalty))[:n_elements]
-
-
-def _bucket(n_elements: int) -> int:
-    """Return the number of elements that is computed instead: a power of two, and not too small."""
-    return max(_SMALLEST_BUCKET, 1 << (n_elements - 1).bit_length())

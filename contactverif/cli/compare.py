@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from concurrent.futures import Executor
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from dataclasses import replace
 from fnmatch import fnmatchcase
 from functools import partial
@@ -212,7 +212,13 @@ def _compare_formulations(job: verify.Job, screen: Screen) -> int:
         if not screen.quiet:
             _show_verdicts(study, screen)
         is_timed = not screen.quiet or PAGE in job.files.paths  # What nobody reads is not waited for.
-        costs, last = _time_evaluations(plugins) if is_timed else (), summary(study.comparison.candidates, quiet=True)
+        last = summary(study.comparison.candidates, quiet=True)
+        costs: tuple[Cost, ...] = ()
+        if is_timed:
+            with suppress(KeyboardInterrupt), Bar() as bar:
+                costs = measure_costs(
+                    [item for item in plugins.subjects if isinstance(item, Subject)], progress=bar.update
+                )
         missing = partial(find_missing, study.run, *plugins, job.sampling)
         write = partial(_write_file, study, plugins, costs)
         end = verify.end_run(job, store, missing, write, promises_kept=study.comparison.candidates.promises_kept)
@@ -221,16 +227,8 @@ def _compare_formulations(job: verify.Job, screen: Screen) -> int:
             last.append("\nStopped before the time of an evaluation was known; all else is above.", "yellow")
     if job.pictures is not None:
         for differing in study.differing:
-            _draw_pictures(differing, *_both(differing, plugins), job.pictures)
+            _draw_pictures(differing, plugins, job.pictures)
     return verify.show_end(job, screen, end, study.run, partial(_show_costs, study, costs, screen), last)
-
-
-def _time_evaluations(plugins: verify.Plugins) -> tuple[Cost, ...]:
-    try:
-        with Bar() as bar:
-            return measure_costs([item for item in plugins.subjects if isinstance(item, Subject)], progress=bar.update)
-    except KeyboardInterrupt:
-        return ()
 
 
 def _both(differing: comparisons.Differing, plugins: verify.Plugins) -> tuple[Property, Subject, Subject]:
@@ -254,10 +252,8 @@ def _write_file(study: Study, plugins: verify.Plugins, costs: Sequence[Cost], pa
     write_page(path, comparison_page(study.comparison, study.differing, drawings, costs), "--out")
 
 
-def _draw_pictures(
-    differing: comparisons.Differing, question: Property, candidate: Subject, reference: Subject, folder: Path
-) -> None:
-    case = differing.sides[0][1].case
+def _draw_pictures(differing: comparisons.Differing, plugins: verify.Plugins, folder: Path) -> None:
+    (question, candidate, reference), case = _both(differing, plugins), differing.sides[0][1].case
     if has_bodies(case):
         from contactverif_reports.plot.scene_figures import plot_scene  # importing matplotlib is slow
 

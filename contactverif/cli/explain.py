@@ -1,5 +1,6 @@
 """The work of `explain`: what a property asks, or what a term means, and the numbers of a case that fails."""
 
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -93,7 +94,8 @@ class TerminalMarkdown:
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> Iterator[Text]:
         narrow = options.update(width=min(options.max_width, _MOST_COLUMNS))
-        for line in console.render_lines(_Markdown(terms.without_links(self.markdown)), narrow):
+        without_links = re.sub(r"(?<![\\!])\[([^\]]+)\]\([^)]*\)", r"\1", self.markdown)  # There is no page to go to.
+        for line in console.render_lines(_Markdown(without_links), narrow):
             text = Text.assemble(*((part.text, part.style or "") for part in line), no_wrap=True)
             text.rstrip()
             yield text

@@ -91,11 +91,6 @@ def constant(value: int) -> int:
     return cast(int, np.int64(value))
 
 
-def python_function(function: Kernel) -> Kernel:
-    """Return the Python function behind a compiled one, for coverage and for tests; or the function if not compiled."""
-    return cast(Kernel, getattr(function, "py_func", function))
-
-
 def match_precision(z: Array, *constants: FloatArray) -> tuple[FloatArray, ...]:
     """Return constants in the precision of a state, real, complex or longdouble, so that no kernel rounds them.
 

@@ -28,11 +28,6 @@ def plain(text: str) -> str:
     return "".join(part if part.startswith("`") else re.sub(r"([*_<\[])", r"\\\1", part) for part in outside)
 
 
-def without_links(text: str) -> str:
-    """Return Markdown in which a link is its words alone, since a terminal has no page to go to."""
-    return re.sub(r"(?<![\\!])\[([^\]]+)\]\([^)]*\)", r"\1", text)
-
-
 _SYMBOL_ROW = re.compile(r"^\| (\S+) \| (.+) \|$", re.MULTILINE)
 
 

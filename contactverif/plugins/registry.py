@@ -79,7 +79,6 @@ _FITTING: dict[Any, tuple[tuple[type, ...], str]] = {
 }
 
 
-# ---------------------------------------------------------------------------------------------------------------------
 # Entry points
 
 
@@ -182,7 +181,6 @@ def digest_files(files: Iterable[tuple[str, Path]]) -> str:
     return total.hexdigest()[:_DIGITS]
 
 
-# ---------------------------------------------------------------------------------------------------------------------
 # Formulations and engines
 
 
@@ -366,7 +364,6 @@ def load_engine(text: str, limits: Limits | None = None) -> EngineSubject | NotL
         return NotLoaded(text, f"make: {describe_error(error)}")
 
 
-# ---------------------------------------------------------------------------------------------------------------------
 # The factory that a text names
 
 
@@ -464,7 +461,6 @@ def _needed_value(make: Callable[..., Any], option: str, value: Any) -> str:
     return "" if isinstance(value, types) and (annotation is bool or not isinstance(value, bool)) else needed
 
 
-# ---------------------------------------------------------------------------------------------------------------------
 # Properties
 
 
@@ -549,7 +545,6 @@ def the_property(property_id: str) -> Property:
     return question
 
 
-# ---------------------------------------------------------------------------------------------------------------------
 # Problems
 
 

@@ -610,7 +610,6 @@ def _in_chunks(cases: tuple[Case, ...], size: int, first: int = 0) -> tuple[Case
     return tuple(CaseChunk(cases[n : n + size], first + n) for n in range(0, len(cases), size))
 
 
-# ---------------------------------------------------------------------------------------------------------------------
 # How far the run is
 
 _LIST = 8  # Cases of a list that is not made yet: making all of them takes a second.

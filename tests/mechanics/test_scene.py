@@ -11,7 +11,6 @@ from pressed_blocks import ALL, LEANING, in_triangles
 from subjects import change_verbs, load_subject
 
 from contactverif import Body, Case, Interface, MisuseError, Subject, Surface
-from contactverif.compiler import python_function
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray
 from contactverif.geometry import projection
 from contactverif.mechanics import newton
@@ -338,6 +337,11 @@ def with_a_far_chain(interface: Interface, n_far: int) -> Interface:
 
 
 Counts = tuple[int, int]
+
+
+def python_function(function: Any) -> Any:
+    """Return the Python function behind a compiled one; or the function if not compiled."""
+    return getattr(function, "py_func", function)
 
 
 @pytest.fixture
