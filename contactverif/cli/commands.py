@@ -32,7 +32,6 @@ CaseId = Annotated[str | None, typer.Option(help="Id of a counterexample in the 
 Share = Annotated[float, typer.Option(help="Share of the cases of each row that is judged again.", metavar="SHARE")]
 _MANY = 8  # Formulations of which the number is not known yet.
 _TYPED = {"names": "Formulations that load a file and may do so, such as c:file=mine.so."}
-_EVERY = "Take every installed formulation that wraps no other."
 
 
 @done_in("listing")
@@ -417,7 +416,7 @@ def bench(
             ],
             {
                 "names": "Formulations, with options; or one file of a bench, FILE.nc, to show it again.",
-                "every": _EVERY,
+                "every": "Take every installed formulation that wraps no other.",
                 "pictures": "Draw the figures into this folder.",
             },
         ),

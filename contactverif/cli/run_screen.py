@@ -293,14 +293,12 @@ def counterexample_text(example: Counterexample, report: Path | None, width: int
     row, outcome = example.row, example.outcome
     words = (textwrap.wrap(each, max(width - 4, 20), subsequent_indent="  ") for each in _numbers(row.info, outcome))
     title = f"{row.formulation}, {row.property_id}: {row.result}, {example.label}{_judged_of_stopped(row)}"
+    has_basis = row.promised_by or row.unexpected == results.BREAKS_LAW
+    basis = [f"promised by {row.promised_by or _BASIC}"] if has_basis else []
     text = indent_below(
         "\n".join(textwrap.wrap(title, max(width, 20), subsequent_indent="  ", break_on_hyphens=False)),
         *chain.from_iterable(words),
-        *(
-            [f"promised by {row.promised_by or _BASIC}"]
-            if row.promised_by or row.unexpected == results.BREAKS_LAW
-            else []
-        ),
+        *basis,
         *as_text(outcome.case).splitlines(),
         *([] if report is None else [example.replay_command(str(report))]),
     )

@@ -54,17 +54,9 @@ def back_to_back(points: FloatArray, slave: IntArray, master: IntArray, boundary
     """Return in words where two surfaces turn their backs to each other; empty if they do not.
 
     Most elements of the slave see no master before them, and behind them the slave's own body ends before the master
-    comes. In a shrink fit, however deep, the master comes first.
-
-    Parameters
-    ----------
-    points : FloatArray, shape (n_points, dim)
-        Positions.
-    slave, master : IntArray, shape (n, n_corners)
-        The elements of both surfaces, each with its body behind it.
-    boundary : IntArray, shape (n, n_corners)
-        All other elements around the bodies, and the master too if both are of one body. Where there are none, a body
-        ends behind an element as far away as the element is wide.
+    comes. In a shrink fit, however deep, the master comes first. The elements of both surfaces, (n, n_corners) at
+    points (n_points, dim), have their bodies behind them. `boundary` are all others around the bodies, and the master
+    too if both are of one body. Where there are none, a body ends behind an element as far away as the element is wide.
     """
     master, boundary = _simplices(master), _simplices(boundary)
     of_master, of_boundary = unit_normals(points[master]), unit_normals(points[boundary])

@@ -209,7 +209,6 @@ class _Deck:
         self.places = np.array(self.points).reshape(-1, 3)
 
     def _add(self, card: _Card, kind: str, part: _Card | list[int]) -> None:
-        """Add members to the set that a card names, if any."""
         if name := card.parameters.get(_SETS[kind]):
             key = kind, card.prefix + _label(name)
             self.names.setdefault(key, (card.instance.replace('"', ""), name.replace('"', "").strip()))

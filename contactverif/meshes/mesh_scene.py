@@ -235,7 +235,6 @@ def _far_nodes(part: _Part) -> IntArray:
 
 
 def _push_slaves(parts: list[_Part], scene: Scene) -> None:
-    """Let the supports of the slaves push them towards the master."""
     ways, directions = ways_to_master(scene.interface)
     seen = np.isfinite(ways)
     slaves = [part for part in parts if part.side == "slave"]

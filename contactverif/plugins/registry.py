@@ -415,7 +415,6 @@ def _callable_of(text: str, entries: Sequence[EntryPoint], arguments: str) -> Ca
 
 
 def _parameters_of(make: Callable[..., Any]) -> Mapping[str, inspect.Parameter]:
-    """Return the parameters of a factory by name; none if it does not say them."""
     try:
         return inspect.signature(make).parameters
     except (TypeError, ValueError):  # A factory written in C has no signature and checks its options itself.

@@ -111,7 +111,10 @@ class _Side:
                 self.bodies.setdefault(body, []).append(number)
                 ends = {frozenset((int(a), int(b))) for a, b in zip(cell, np.roll(cell, -1), strict=True)} & sides
                 faces += [(number, {corners.tolist().index(node) for node in end}) for end in ends]
-        self._set_regions(faces)
+        for body, numbers in self.bodies.items():
+            self.mesh.set_region(body + 1, np.array([numbers, [-1] * len(numbers)]))
+        pairs = [(number, _FACES[3 if number in self.cells_of[3] else 4].index(ends)) for number, ends in faces]
+        self.mesh.set_region(_REGION, np.array(pairs).reshape(-1, 2).T)
         self.field, self.in_cells, self.on_edges = gf.MeshFem(self.mesh, 2), gf.MeshIm(self.mesh), gf.MeshIm(self.mesh)
         for count, (_, element, _) in _SHAPES.items():
             if self.cells_of[count]:
@@ -120,12 +123,6 @@ class _Side:
         for number, corners in corners_of.items():
             self.unknowns[corners] = np.asarray(self.field.basic_dof_from_cvid(number)[0]).reshape(-1, 2)
         self.node_numbers = np.flatnonzero(self.unknowns[:, 0] >= 0)
-
-    def _set_regions(self, faces: list[tuple[int, set[int]]]) -> None:
-        for body, numbers in self.bodies.items():
-            self.mesh.set_region(body + 1, np.array([numbers, [-1] * len(numbers)]))
-        pairs = [(number, _FACES[3 if number in self.cells_of[3] else 4].index(ends)) for number, ends in faces]
-        self.mesh.set_region(_REGION, np.array(pairs).reshape(-1, 2).T)
 
     def add_to(self, model: Any, name: str, order: int) -> None:
         """Add the displacements of the side, its materials, supports and loads to a model."""

@@ -27,7 +27,6 @@ from contactverif.contract.arrays import FloatArray, IntArray
 from contactverif.contract.body import Body
 from contactverif.contract.schema import Group
 from contactverif.mechanics import newton
-from contactverif.mechanics.scene import Scene
 from contactverif.problems import hertz
 from contactverif.problems.disk import DiskProblem, disk_on_foundation
 from contactverif_paper import paper_formulations as paper
@@ -76,7 +75,7 @@ def solve_disk(
 
     `lowered` is the depth of the disk in the first guess, over what is about right.
     """
-    scene = _disk_scene(problem, refine)
+    scene = _disk_scene(problem, refine=refine)
     plugin = subject_of(formulation).for_case(scene.case())
     trace = newton.solve(scene, plugin, start=lowered * scene.start)
     points = plugin.contact_points(scene.interface, plugin.pair(scene.interface, trace.z), trace.z)
@@ -95,10 +94,8 @@ def solve_disk(
     )
 
 
-@lru_cache(maxsize=2)
-def _disk_scene(problem: DiskProblem = PAPER, refine: int = 1) -> Scene:
-    """Return the scene of Example 2. The last two are kept, since condensing one takes longer than solving it."""
-    return disk_on_foundation(problem, refine=refine)
+# The last two scenes are kept, since condensing one takes longer than solving it.
+_disk_scene = lru_cache(maxsize=2)(disk_on_foundation)
 
 
 def steps_until_energy(energies: FloatArray) -> int:

@@ -12,7 +12,6 @@ import numpy as np
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF, BoolArray, FloatArray
 from contactverif.contract.case import Case
-from contactverif.contract.interface import Surface
 from contactverif_reports.tables import decimal
 
 NEARLY_FLAT = 0.05  # A surface is drawn as a straight line if its rise is at most this share of its length.
@@ -33,7 +32,7 @@ class Course:
     def from_case(cls, case: Case) -> Self:
         """Measure a case. Coordinates begin at the node furthest back along the direction."""
         positions, interface = case.positions, case.interface
-        chords = _chords(interface.slave, positions)
+        chords = np.diff(positions[interface.slave.segments], axis=1)[:, 0]
         if not np.linalg.norm(chords.sum(axis=0)) > 1e-6 * np.linalg.norm(chords, axis=1).sum():
             chords = np.array([[1.0, 0.0]])  # A ring has no mean direction.
         direction = chords.sum(axis=0) / np.linalg.norm(chords.sum(axis=0))
@@ -83,7 +82,7 @@ class Gaps:
     def from_case(cls, case: Case) -> Self:
         """Compare each slave node with every master segment."""
         positions, master = case.positions, case.interface.master
-        first, chords = positions[master.segments[:, 0]], _chords(master, positions)
+        first, chords = positions[master.segments[:, 0]], np.diff(positions[master.segments], axis=1)[:, 0]
         lengths = np.maximum(np.linalg.norm(chords, axis=1), np.finfo(float).tiny)
         tangents = chords / lengths[:, None]
         normals = np.column_stack([tangents[:, 1], -tangents[:, 0]])
@@ -108,10 +107,6 @@ class Gaps:
 def segment_lengths(case: Case) -> list[FloatArray]:
     """Return the current lengths of the segments, of the slave and of the master."""
     return [surface.lengths(case.positions) for surface in (case.interface.slave, case.interface.master)]
-
-
-def _chords(surface: Surface, positions: FloatArray) -> FloatArray:
-    return positions[surface.segments[:, 1]] - positions[surface.segments[:, 0]]
 
 
 _LARGEST_DENOMINATOR = 64
