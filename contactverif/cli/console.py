@@ -13,7 +13,6 @@ from rich.text import Text
 from contactverif.contract.errors import printable
 from contactverif.isolation.host import end_all
 
-_LINES_OF_A_PLUGIN = 5
 _PIPE_WIDTH = 140  # The number of columns where no terminal says how many there are.
 
 
@@ -58,7 +57,7 @@ def echo(words: str, *, to_stderr: bool = False) -> None:
 def print_plugin_output() -> None:
     """End the processes of the plugins, and show the last lines that each of them printed."""
     for name, printed in end_all().items():
-        lines = printed.decode(errors="replace").splitlines()[-_LINES_OF_A_PLUGIN:]
+        lines = printed.decode(errors="replace").splitlines()[-5:]
         show_verbatim(Text("\n".join([f"the process of {name} printed, at last:", *(f"    {line}" for line in lines)])))
 
 

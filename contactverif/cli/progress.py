@@ -24,7 +24,6 @@ from contactverif.run import scheduler
 from contactverif_reports.tables import PLAIN_STYLE, STYLES
 
 SIGNALED = 128  # The exit status of a run that a signal stops is this and its number.
-_BAR_WIDTH = 10
 _LONGEST = 120  # Characters beside the bar.
 _LONG_CASE = 10.0  # Seconds without news that are worth a word.
 _PAUSE = 5.0  # Seconds between two lines about the whole, where there is no terminal.
@@ -50,7 +49,7 @@ class Bar:
         self._first_wait = first_wait  # Seconds that the first call of a plugin may take; 0 if that is not known.
         self._progress = Progress(
             TextColumn("{task.description}", markup=False, table_column=Column(ratio=1, no_wrap=True)),
-            BarColumn(_BAR_WIDTH),
+            BarColumn(bar_width=10),
             MofNCompleteColumn(),
             _TimeColumn(),
             expand=True,

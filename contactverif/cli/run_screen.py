@@ -58,7 +58,6 @@ _MEANINGS = {  # The results that are explained below the table where they occur
     Result.NOT_APPLICABLE: "the property makes no sense for this formulation, or for this mesh or scene",
     Result.NOT_PROVIDED: "the formulation leaves out a part that the property needs",
 }
-_BASIC = "no trait: it is a basic law of contact"
 _KIND_COLUMNS = ("planned", "judged", "failed", "undecided", "idle")
 _NO_KIND = "other"  # The line of the cases that name no kind.
 
@@ -294,7 +293,7 @@ def counterexample_text(example: Counterexample, report: Path | None, width: int
     words = (textwrap.wrap(each, max(width - 4, 20), subsequent_indent="  ") for each in _numbers(row.info, outcome))
     title = f"{row.formulation}, {row.property_id}: {row.result}, {example.label}{_judged_of_stopped(row)}"
     has_basis = row.promised_by or row.unexpected == results.BREAKS_LAW
-    basis = [f"promised by {row.promised_by or _BASIC}"] if has_basis else []
+    basis = [f"promised by {row.promised_by or 'no trait: it is a basic law of contact'}"] if has_basis else []
     text = indent_below(
         "\n".join(textwrap.wrap(title, max(width, 20), subsequent_indent="  ", break_on_hyphens=False)),
         *chain.from_iterable(words),

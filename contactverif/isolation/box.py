@@ -24,14 +24,12 @@ from time import monotonic, sleep, time
 
 from contactverif.isolation.confine import NETWORK, PROCESSES, WRITABLE, landlock_version
 
-_SECONDS_TO_TRY = 10.0
 ATTEMPTS = 3  # Attempts to make a box: a socket that it hides may go meanwhile, and then it is not made.
 _INSTALL = "install the package bubblewrap of the system, or contactverif[box]"
 _ALLOW = "allow user namespaces, see 'What a plugin can do' in the documentation"
 MOST_PROCESSES = 512  # Processes and threads.
 _BASE_MEMORY = 512 << 20  # Bytes beyond the limit of memory, for Python and what it has loaded.
 _GROUP_PREFIX = "contactverif-"
-_SECONDS_TO_END = 10.0
 _SECONDS_TO_JOIN = 60.0
 _SECONDS_TO_KEEP = 30 * 86400.0
 _ROOT = Path("/sys/fs/cgroup")
@@ -119,7 +117,7 @@ def why_no_box(box: Box = Box()) -> str:
                 capture_output=True,
                 text=True,
                 errors="replace",
-                timeout=_SECONDS_TO_TRY,
+                timeout=10.0,
                 check=False,
             )
         except (OSError, subprocess.TimeoutExpired) as error:
@@ -212,7 +210,7 @@ class ControlGroup:
 
     def remove(self) -> None:
         """Remove the group, once its processes have ended; the system takes a moment for that."""
-        deadline = monotonic() + _SECONDS_TO_END
+        deadline = monotonic() + 10.0
         while self.folders and not _remove(self.folders[-1]) and monotonic() < deadline:
             sleep(0.01)
         self.folders = [folder for folder in self.folders if not _remove(folder)]

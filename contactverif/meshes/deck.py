@@ -42,7 +42,6 @@ _PAIRS = {"CONTACTPAIR", "CONTACTINCLUSIONS", "TIE"}  # The others count where t
 _OTHER_CARDS = {*_PAIRS, "MATERIAL", "ELASTIC", "SOLIDSECTION"}  # No parameter of these moves a surface.
 # What is not told: output, steps, and laws of the contact, for which the formulation is.
 _QUIET = re.compile(r"HEADING|PREPRINT|RESTART|.*(PRINT|FILE|OUTPUT)|(END)?STEP|STATIC|SURFACE(INTERACTION|BEHAVIOR)")
-_LOADS = {"BOUNDARY", "CLOAD", "DLOAD", "DSLOAD"}
 _REFUSED = "NCOPY NGEN NFILL NMAP ELGEN ELCOPY SYSTEM IMPERFECTION ADJUST PARAMETER IMPORT REFINEMESH INCLUDE"
 _DEEPEST, _MOST_FILES, _LONGEST = 20, 1000, 10**7  # Sets in sets and files in files; files; a range of numbers.
 # A keyword line goes on behind a comma if there are parameters; data may follow such a comma too.
@@ -149,7 +148,7 @@ def _read_cards(text: str, warnings: list[str]) -> tuple[list[_Card], dict[str, 
             cards += [replace(each, instance=name, prefix=_label(name)) for each in parts[part]]
         elif keyword in _MESH_CARDS | _OTHER_CARDS:
             current.append(card)
-        elif keyword in _LOADS:
+        elif keyword in {"BOUNDARY", "CLOAD", "DLOAD", "DSLOAD"}:
             loads.append(f"*{keyword}")
         elif not _QUIET.fullmatch(keyword):
             skipped.append(f"*{' '.join(title.upper().split())}")

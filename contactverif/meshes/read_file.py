@@ -24,7 +24,6 @@ from contactverif.meshes.plain_mesh import Group, PackedMesh, PlainMesh
 # The cell data in which formats that number their groups store the numbers: `3` names a group. In any other array of
 # whole numbers `facet_tags=3` does.
 TAGS = ("gmsh:physical", "medit:ref", "cell_tags", "ugrid:ref", "su2:tag", "nastran:ref", "avsucd:material")
-NO_GROUPS = ("gmsh:geometrical",)
 _MOST_VALUES = 1000  # An array with more different numbers counts the cells, and groups none.
 _NASTRAN, _MARK = (".bdf", ".fem", ".nas"), b"\xef\xbb\xbf"
 _EXODUS = (".e", ".exo", ".ex2", ".exoii", ".g", ".gen")
@@ -133,7 +132,7 @@ def _groups(mesh: Any, errors: StringIO) -> dict[str, Group]:
         values = [np.reshape(part, -1) for part in parts]  # In VTK a number may be a row.
         is_one_each = [part.shape for part in values] == [(len(block),) for block in mesh.cells]
         is_whole = key in TAGS or all(part.dtype.kind in "iub" for part in values)
-        if key in NO_GROUPS or not is_one_each or not is_whole:
+        if key == "gmsh:geometrical" or not is_one_each or not is_whole:
             continue
         if any(not np.isfinite(part).all() or (np.abs(part) > 2**53).any() for part in values):
             raise ValueError(f"{key!r} that holds no whole numbers")

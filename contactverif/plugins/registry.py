@@ -57,7 +57,6 @@ ENGINE_PROPERTIES = "contactverif.engine_properties"  # Those that are asked of 
 ENGINES = "contactverif.engines"
 PROBLEMS = "contactverif.problems"
 _RENAMED = {"scale": "total-stiffness", "scaling": "units", "engine.scaling": "engine.units"}  # {former id: id}
-_COMPILE_SECONDS = 60.0
 _OURS = "contactverif"  # The distribution whose problems keep their names.
 
 _MOST_WRAPPERS = 3  # Each wrapper calls its formulation several times, so time grows exponentially with their number.
@@ -293,7 +292,7 @@ def _compile_once(packages: frozenset[str]) -> None:
                 place = source.parent if spec and spec.submodule_search_locations else source
                 # All of numba is too much.
                 arguments = ["-c", "import numba"] if name == "numba" else ["-m", "compileall", "-q", str(place)]
-                subprocess.run([sys.executable, *arguments], capture_output=True, check=False, timeout=_COMPILE_SECONDS)
+                subprocess.run([sys.executable, *arguments], capture_output=True, check=False, timeout=60.0)
 
 
 def _worker() -> tuple[str, ...]:

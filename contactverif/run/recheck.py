@@ -25,7 +25,6 @@ SHARE = 0.01  # The share of the cases of a row that is judged again, at least o
 # On another machine two values agree that differ by at most their tolerance, or by this share of the larger one.
 ROUNDOFF = 1e-6
 _CHUNK = 25  # The number of cases that are judged in one job.
-_NO_CASE = "the run has no such case"
 
 
 def choose_share(numbers: Sequence[int], share: float = SHARE) -> list[int]:
@@ -45,7 +44,7 @@ class Sample:
     def differences(self) -> list[str]:
         """The cases that differ, and how; an outcome of a case that the run does not have is one of them."""
         names = {number: "the witness" if number == WITNESS else f"case {number}" for number in sorted(self.outcomes)}
-        words = {number: self.words.get(number, _NO_CASE) for number in names}
+        words = {number: self.words.get(number, "the run has no such case") for number in names}
         return [f"{name}: {words[number]}" for number, name in names.items() if words[number]]
 
     def note(self, numbers: Sequence[int], words: Sequence[str]) -> None:
