@@ -1,7 +1,5 @@
 """The runs of the harness: `verify`, the shards of `campaign`, and `merge`, which makes the report of all shards."""
 
-from __future__ import annotations
-
 import gc
 import os
 import shlex
@@ -328,6 +326,15 @@ def _run_job(job: Job, screen: Screen, *, memory: bool = False) -> int:
     return show_end(job, screen, end, result, show_result, last_line, advice)
 
 
+class End(NamedTuple):
+    """The files, the exit status and what is missing of a run."""
+
+    files: OutputFiles  # Those that were written.
+    missing: str  # What was not judged; empty if nothing is missing.
+    complete: bool
+    status: int  # The exit status; 0 only if nothing is missing in the run or in its files, and promises are kept.
+
+
 def show_end(
     job: Job, screen: Screen, end: End, result: Run, show_result: Callable[[], None], last_line: Text, advice: str = ""
 ) -> int:
@@ -354,15 +361,6 @@ def show_end(
     if not end.complete:
         print_resume_hint(job)
     return end.status
-
-
-class End(NamedTuple):
-    """The files, the exit status and what is missing of a run."""
-
-    files: OutputFiles  # Those that were written.
-    missing: str  # What was not judged; empty if nothing is missing.
-    complete: bool
-    status: int  # The exit status; 0 only if nothing is missing in the run or in its files, and promises are kept.
 
 
 def end_run(

@@ -19,8 +19,6 @@ Rule for the next editor: only this file knows the inside of numba's cache. Wher
 kernels are stored as numba does it, unchecked.
 """
 
-from __future__ import annotations
-
 import hashlib
 import pickle
 from collections.abc import Callable
@@ -105,7 +103,7 @@ class CheckedFiles(IndexDataCacheFile):
     """The files of one kernel: an index and a file for each signature, each with its digest at the end."""
 
     function: Callable[..., Any]  # The Python function of the kernel.
-    usual: tuple[CheckedFiles, ...] = ()  # The files in the stores that are read if a signature is not in this one.
+    usual: "tuple[CheckedFiles, ...]" = ()  # The files in the stores that are read if a signature is not in this one.
 
     @cached_property
     def stamp(self) -> tuple[Any, ...]:

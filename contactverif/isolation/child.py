@@ -191,9 +191,8 @@ class _Fork:
     """A copy of this process, with the methods of `subprocess.Popen` that a `Child` needs."""
 
     def __init__(self, pid: int) -> None:
-        self.pid, self._status = pid, None
-
-    _status: int | None
+        self.pid = pid
+        self._status: int | None = None
 
     def wait(self, timeout: float | None = None) -> int:
         deadline = None if timeout is None else perf_counter() + timeout

@@ -4,8 +4,6 @@ Rules: each answers as it does in this process, but for a process that dies or h
 one answers in its place. Nothing of a plugin is imported here, and what its process states is checked like an answer.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import sys
@@ -76,7 +74,7 @@ class _Remote(Generic[_Traits]):
 class RemoteFactory(_Remote[Traits]):
     """A factory ``make(*, penalty)`` of a formulation."""
 
-    def __call__(self, *, penalty: float) -> RemoteFormulation:
+    def __call__(self, *, penalty: float) -> "RemoteFormulation":
         """Return the formulation with a penalty."""
         return RemoteFormulation(self, penalty)
 

@@ -5,8 +5,6 @@ so do the first failures. Of all others the numbers stay, in one long array and 
 stores. An outcome is made of them again when it is read.
 """
 
-from __future__ import annotations
-
 from array import array
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -174,7 +172,7 @@ class OpenRow:
         witness = self._witness_outcome if place is None else self.outcomes[place]
         self.row = judge_row(self._row_of(self.outcomes, self.planned, witness), self, sampling)
 
-    def stop(self, examples: int, early: OpenRow | None) -> None:
+    def stop(self, examples: int, early: "OpenRow | None") -> None:
         """Make the row of a run, with so many random cases, that was stopped before all cases were judged.
 
         Those of the first round, which are in an `early` row, count as long as they are not judged again.

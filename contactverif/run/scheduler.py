@@ -9,8 +9,6 @@ The workers also load formulations, while the run's own process does other thing
 its process ready when the first cases come.
 """
 
-from __future__ import annotations
-
 import io
 import pickle
 from collections import deque
@@ -92,7 +90,7 @@ class Job:
 
     function: Callable[..., Any]
     arguments: tuple[Any, ...]
-    then: Callable[[Any], Iterable[Job] | None]
+    then: "Callable[[Any], Iterable[Job] | None]"
     progress: Progress | None = None  # At its start. In the parent, the function gets `count` to report each case.
     is_local: bool = False  # The parent does it, if it takes part.
 

@@ -4,8 +4,6 @@ With `cv_pair` the decisions are a pairing like any other. Without it the elemen
 harness chooses travels in a `Handle`. An element is shown a part of the interface, in the form of `cv_view`.
 """
 
-from __future__ import annotations
-
 import ctypes
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -61,7 +59,7 @@ class Views:
         segments = (self.arrays[name].shape[-2] for name in ("slave", "master"))
         return (self.n_slave_nodes, self.nodes.shape[1] - self.n_slave_nodes, *segments)
 
-    def select(self, selection: BoolArray) -> Views:
+    def select(self, selection: BoolArray) -> "Views":
         """Return some of the elements, selected by mask (n,)."""
         arrays = {name: array if array.ndim == 2 else array[selection] for name, array in self.arrays.items()}
         return Views(self.places[selection], self.labels[selection], self.nodes[selection], self.n_slave_nodes, arrays)

@@ -9,8 +9,6 @@ keys are the names of the traits. Tables such as `[promises]` group them as the 
 have the same name, so a flat list says the same.
 """
 
-from __future__ import annotations
-
 import ctypes
 import tomllib
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -194,7 +192,7 @@ class GuardedSlot:
         """Set arguments that are the same in all calls."""
         SlotRows(self, self.empty[None]).fill(values)
 
-    def rows(self, n_rows: int) -> SlotRows:
+    def rows(self, n_rows: int) -> "SlotRows":
         """Return the memory of so many calls, zero but for the guards."""
         return SlotRows(self, np.tile(self.empty, (n_rows, 1)))
 
