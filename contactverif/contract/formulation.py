@@ -186,12 +186,13 @@ class Pairing(Mapping[str, NDArray[Any]]):
     def check_bounds(self, interface: Interface) -> None:
         """Raise a ContractError unless every integer can number something of the problem.
 
-        That is −1, a segment, node or unknown, or an entry of the longest array of the pairing.
+        That is −1, a segment, node or unknown, a pair of these or a point, or an entry of the longest array.
         """
         lowest, highest = self._integers.min(initial=0), self._integers.max(initial=0)
         if lowest >= -1 and highest <= interface.n_unknowns:
             return
-        most = max(interface.n_unknowns, *(values.size for values in self._arrays.values()))
+        # Where points that touch nothing are left out, the others have larger numbers than arrays are long.
+        most = max(interface.n_unknowns**2, *(values.size for values in self._arrays.values()))
         if not -1 <= lowest <= highest <= most:
             outlier = lowest if lowest < -1 else highest
             name = next(name for name, values in self.items() if values.dtype == _INTEGER and (values == outlier).any())

@@ -241,7 +241,7 @@ WRONG_ANSWERS: dict[tuple[str, type[ContractError]], list[tuple[Any, str]]] = {
     ("pair", ContractError): [
         (None, "pair: returned a NoneType; needed a mapping"),
         ({"xi": np.zeros(3)}, "pair: 'xi' is dtype float64"),
-        ({"segment": np.array([11])}, "pair: 'segment' holds 11; needed integers from −1 to 10"),
+        ({"segment": np.array([101])}, "pair: 'segment' holds 101; needed integers from −1 to 100"),
         (Pairing({"segment": np.array([-2])}), "pair: 'segment' holds -2"),
     ],
 }
