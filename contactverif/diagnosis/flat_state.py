@@ -100,18 +100,13 @@ def flat_state(
 
 
 @cache
-def flat_state_of(corners: int, depth: float = DEPTH, slender: float = 1.0) -> FlatState:
-    """Return a uniform state of segments, or of faces: a slave of 2 × 2 cells inside a master of 3 × 2.
-
-    All y are divided by `slender`.
-    """
+def flat_state_of(corners: int, depth: float = DEPTH) -> FlatState:
+    """Return a uniform state of segments, or of faces: a slave of 2 × 2 cells inside a master of 3 × 2."""
     if corners == SEGMENT:
         return flat_state(depth=depth)
     upper, slave = grid(corners, np.array([0.0, 1.0, 2.25]), np.array([0.0, 1.25, 2.0]))
     steps = np.array([-0.75, 0.3125, 1.5, 3.5]), np.array([-0.375, 0.875, 2.25])
-    lower, master = grid(corners, *steps, shear=-0.125 if slender == 1 else -0.375)  # Then rows are half a cell apart.
-    upper[:, 1] /= slender
-    lower[:, 1] /= slender
+    lower, master = grid(corners, *steps, shear=-0.125)
     nodes, n_slave = np.vstack([upper, lower]), len(upper)
     interface = Interface(nodes, Surface(slave[:, ::-1]), Surface(master + n_slave))
     places = [(Fraction(x), Fraction(y)) for x, y in nodes[:, :2].tolist()]

@@ -38,7 +38,6 @@ _LIFTS = 2.0 ** np.arange(6, -3, -1)
 _TOO_SMALL, _LARGE = 2.0**-26, 2.0**-12
 # The penetrations of a law are 2 to the power of minus these, small against all segments.
 _POWERS = range(16, 4, -1)
-_SLENDER = 16.0
 _OVERHANG = "where the slave reaches past both ends of the master"
 _PLACES = {
     "on a slave that is finer than its master": FINE,
@@ -96,10 +95,8 @@ def _patterns(subject: Subject, in_full: bool) -> Iterator[str]:
 def _patterns_in_space(subject: Subject, in_full: bool) -> Iterator[str]:
     if subject.traits.rules.penalty == "nodal" or subject.traits.promises.patch.flat is False:
         return
-    for words, slender in (("", 1.0), ("on slender faces: ", _SLENDER)):
-        for corners in sorted(subject.traits.abilities.faces):
-            state = flat_state_of(corners, slender=slender)
-            yield from (words + text for text in _uniform_patterns(subject, state, in_full) if text)
+    for state in map(flat_state_of, sorted(subject.traits.abilities.faces)):
+        yield from _uniform_patterns(subject, state, in_full)
     yield diagnose_skewed(subject)
 
 
