@@ -12,7 +12,7 @@ from textbook_springs import CentredSprings
 from zoo.at_points import NearbyOnly, TurnedFrame
 
 import contactverif_nts
-from contactverif import Case, Interface, Rules, Subject, Surface, Traits, Verdict, judge_case
+from contactverif import Abilities, Case, Interface, Promises, Rules, Subject, Surface, Traits, Verdict, judge_case
 from contactverif.run.run import run
 from contactverif.sampling.draw import draw_cases
 from contactverif_properties.balance import RADII, symmetric
@@ -153,6 +153,44 @@ def test_our_own_formulations_keep_every_bit_beside_another_body(name: str) -> N
         assert remote.measure(state, load_subject(name)).details[BITS] == 0
         kinds.add(state.kind)
     assert kinds == {FAR, BEHIND}
+
+
+class BothSurfaces:
+    """Equal springs in space, in the middle of each edge of both surfaces, to the nearest triangle across it."""
+
+    traits = Traits(promises=Promises(unbiased=True, conserves_force=True), abilities=Abilities(dimensions=(3,)))
+
+    def __init__(self, *, penalty: float) -> None:
+        self.penalty = penalty
+
+    def residual(self, interface: Any, pairing: Any, z: Any) -> Any:
+        x = z.reshape(-1, 3)
+        forces = np.zeros_like(x)
+        for side, other in ((interface.slave, interface.master), (interface.master, interface.slave)):
+            a, b, c = np.moveaxis(x[other.faces], 1, 0)
+            double = np.cross(b - a, c - a)
+            sizes = np.linalg.norm(double, axis=1)
+            normals = double / sizes[:, None]
+            for edge in np.vstack([np.roll(side.faces, shift, axis=1)[:, :2] for shift in range(3)]):
+                point = x[edge].mean(axis=0)
+                parts = np.stack([np.cross(q - p, point - p) for p, q in ((b, c), (c, a), (a, b))])
+                shares = (parts * normals).sum(axis=2) / sizes
+                heights = ((point - a) * normals).sum(axis=1)
+                face = np.where((shares > 0).all(axis=0), np.abs(heights), np.inf).argmin()
+                if (shares[:, face] > 0).all() and heights[face] < 0:
+                    push = self.penalty * heights[face] * normals[face]
+                    forces[edge] += push / 2
+                    forces[other.faces[face]] -= shares[:, [face]] * push
+        return forces.reshape(-1)
+
+
+def test_a_second_pass_may_find_a_body_inside_that_of_the_slave() -> None:
+    two_passes = Subject("both surfaces", BothSurfaces)
+    question = load_property("remote").for_traits(two_passes.traits)
+    cases = draw_cases(question.cases(None), seed="remote", examples=40).cases
+    behind = [case for case in cases if "behind" in case.parameters]
+    assert len(behind) > 5
+    assert {judge_case(question, case, two_passes).verdict for case in behind} <= {Verdict.PASS, Verdict.UNDECIDED}
 
 
 def test_on_an_exact_bisector_numbers_decide_nothing() -> None:
