@@ -61,7 +61,8 @@ def diagnose(subject: Subject, property_id: str, others: Sequence[str] = ()) -> 
             # A right tangent is no derivative of wrong forces, and says nothing of these.
             if not text and any(name.startswith(_OF_FORCES) for name in every):
                 return ""
-            return OF_TANGENT.join(filter(None, (text, diagnose_tangent(subject))))
+            tangent = diagnose_tangent(subject)
+            return text + (OF_TANGENT if text else "of the tangent: ") + tangent if tangent else text
     except ContractError:
         return ""
 
