@@ -27,14 +27,20 @@ PROPERTIES = ("patch.flat.transmission", "patch.flat.solve", "newton.history", "
 def write_report(path: Path, properties: Sequence[str] = PROPERTIES) -> str:
     """Write a small report of some properties; return the id of a counterexample."""
     from contactverif.contract.counterexample import counterexamples
+    from contactverif.contract.schema import NAMED_CASES, Group
     from contactverif.plugins.registry import load_formulation, load_properties
+    from contactverif.problems.named_states import named_case
     from contactverif.run.run import run
-    from contactverif_reports.netcdf.write import write
+    from contactverif_reports.netcdf import file_groups
+    from contactverif_reports.netcdf.stored_outcomes import case_group
+    from contactverif_reports.netcdf.write import tree_of
 
     subjects = [load_formulation(name) for name in ("nts", "vts-ppt")]
     questions = load_properties(list(properties))
     result = run(subjects, questions, examples=8, seed=3)
-    write(result, path, with_named_cases=True)
+    # Old reports hold named cases.
+    named = Group(case_group(named_case("c-prime")), {"case_of": properties[0]})
+    file_groups.write_tree(tree_of(result) | {f"/{NAMED_CASES}/c_prime": named}, path)
     return next(iter(counterexamples(result)))
 
 

@@ -345,7 +345,7 @@ def _attributes(owner: Any) -> dict[str, str]:
     return {name: repr(owner.getncattr(name)) for name in owner.ncattrs()}
 
 
-@pytest.mark.parametrize("make", [small_groups, lambda: tree_of(small_run(), with_named_cases=True)])
+@pytest.mark.parametrize("make", [small_groups, lambda: tree_of(small_run())])
 def test_a_file_is_the_one_that_xarray_writes(make: Any, tmp_path: Path) -> None:
     write_tree(make(), tmp_path / "ours.nc")
     tree = xr.DataTree.from_dict({path: as_xarray(group) for path, group in make().items()})

@@ -1,9 +1,8 @@
-"""Outcomes and cases in a report, written and read: of random cases, witnesses, counterexamples, and named cases.
+"""Outcomes and cases in a report, written and read: of random cases, witnesses and counterexamples.
 
 A report may hold millions of cases. Made all at once, they would take a hundred times the memory of the arrays, so each
-outcome is made from the arrays of its group when somebody asks for it. A case is rebuilt to the last bit. A property
-with a finite list of cases asks every formulation the same, so such a case belongs to its property, and is stored once
-however many formulations fail it.
+outcome is made from the arrays of its group when somebody asks for it. A case is rebuilt to the last bit. Some stored
+reports hold the named cases of a property, too, which are read but no longer written.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -16,7 +15,7 @@ from numpy.typing import NDArray
 from contactverif.contract import schema
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import BODIES, Case, CaseSummary
-from contactverif.contract.counterexample import Counterexample, counterexamples, distinct, named_failures, typeable
+from contactverif.contract.counterexample import Counterexample, counterexamples, distinct, typeable
 from contactverif.contract.interface import PLANE
 from contactverif.contract.property import (
     Finding,
@@ -32,7 +31,6 @@ from contactverif.contract.result import NodalForces, Run
 from contactverif.contract.schema import Axes, Group, StoredColumns, Variable, codes, numbers, to_variables, words
 
 Table = dict[str, Variable]
-_FOLDER = f"/{schema.NAMED_CASES}"
 _OF_NODES = ("nodes", "fixed", "imposed", "load")  # Arrays (n_nodes, 2).
 _OF_BODIES = {"count": (), "is_slave": (), "young": (), "poisson": (), "axis": (2,), "start": (2,)}
 ARRAY_NAME = "case_array"  # The attribute that names the array of Case.to_arrays().
@@ -363,29 +361,11 @@ def case_of_group(dataset: Group) -> Case:
     return case
 
 
-def named_case_groups(run: Run) -> dict[str, Group]:
-    """Return `named_cases`, and in it a group with the arrays of each case.
-
-    The attribute `property_id` would make a group that of a property, so a case says `case_of` instead.
-    """
-    comment = (
-        "the named cases that a formulation fails; to judge one again: contactverif replay REPORT --case "
-        "FORMULATION.PROPERTY.CASE"
-    )
-    groups = {_FOLDER: Group(attrs={"comment": comment})}
-    for example in named_failures(run).values():
-        name = f"{_FOLDER}/{typeable(f'{example.property_id}.{example.case.name}')}"
-        if name not in groups:
-            group = case_group(example.case)
-            groups[name] = Group(group, {**group.attrs, "case_of": schema.text(example.property_id)})
-    return groups
-
-
 def read_named_cases(groups: Mapping[str, Group]) -> dict[tuple[str, str], Case]:
     """Return {(property id, name): case} of a report; empty where it stores none."""
     cases = {}
     for path, dataset in groups.items():
-        if path.startswith(f"{_FOLDER}/"):
+        if path.startswith(f"/{schema.NAMED_CASES}/"):
             case = case_of_group(dataset)
             cases[str(dataset.attrs["case_of"]), case.name] = case
     return cases

@@ -31,13 +31,13 @@ _RESERVED = frozenset({schema.SUMMARY, schema.COUNTEREXAMPLES, schema.TIMING, sc
 _COUNTED = ("planned", "judged", "failed", "undecided", "idle")
 
 
-def write(run: Run, path: str | os.PathLike[str], *, with_named_cases: bool = False) -> None:
+def write(run: Run, path: str | os.PathLike[str]) -> None:
     """Write the report of a run, whole or not at all, in place of a file that is there."""
     from contactverif_reports.netcdf.file_groups import write_tree
 
     check_writable(path)
     with whole(path) as part:
-        write_tree(tree_of(run, with_named_cases=with_named_cases), part)
+        write_tree(tree_of(run), part)
 
 
 def as_tree(run: Run) -> xr.DataTree:
@@ -54,8 +54,8 @@ def as_tree(run: Run) -> xr.DataTree:
     return tree
 
 
-def tree_of(run: Run, *, with_named_cases: bool = False) -> dict[str, Group]:
-    """Return all groups of the report of a run, if wanted with each named case that a formulation fails."""
+def tree_of(run: Run) -> dict[str, Group]:
+    """Return all groups of the report of a run."""
     groups = {"/": Group(attrs=root_attributes(run)), f"/{schema.SUMMARY}": _summary(run)}
     rows = run.row_of
     for (id_, info), name in zip(run.properties.items(), group_names(run.properties).values(), strict=True):
@@ -65,8 +65,6 @@ def tree_of(run: Run, *, with_named_cases: bool = False) -> dict[str, Group]:
             groups.setdefault(f"/{'/'.join(folders[:depth])}", Group(attrs=comment))
         groups[name] = _property_group(info, {name: rows.get((name, id_)) for name in run.formulations})
     groups |= stored.counterexample_groups(run)
-    if with_named_cases:
-        groups |= stored.named_case_groups(run)
     groups[f"/{schema.TIMING}"] = _timing(run)
     return groups
 
