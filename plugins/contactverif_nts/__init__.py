@@ -1,8 +1,8 @@
 """Node-to-segment formulations of Zavarise & De Lorenzis, IJNME 79 (2009) 379–416, with exact tangents.
 
 `point_contact` has the methods that are points on slave segments (NTS, NTS-AR, VTS-G, VTS-ME); `nts_force` has their
-forces, Eq. 6. `patch_test_passing` has the presets of VTS-PPT; `walk` is the pairing of Boxes 1 and 2, `vts_ppt_force`
-has the forces of Box 3, `vts_ppt_tangent` their derivative. `two_passes` wraps any one-pass formulation. All of them
+forces, Eq. 6. `patch_test_passing` has the presets of VTS-PPT; `vts_ppt_force` has the pairing of Boxes 1 and 2 and
+the forces of Box 3, `vts_ppt_tangent` their derivative. `two_passes` wraps any one-pass formulation. All of them
 are frictionless, stateless and two-dimensional.
 
 | argument of a factory | meaning |
@@ -12,7 +12,7 @@ are frictionless, stateless and two-dimensional.
 | `n` | number of points on a slave segment, ≥ 1 |
 | `area` | configuration in which lengths of areas of competence are measured: "current" or "reference" |
 | `tau` | part of a master segment by which a foot may lie past its free end and still count |
-| `free_end` | what happens to an area of competence that overhangs a free end of the master; `walk` says it |
+| `free_end` | what happens to an area of competence that overhangs a free end of the master; `vts_ppt_force` says it |
 | `threads` | how many threads share the work on a large interface, ≥ 1; the answers have the same bits |
 """
 

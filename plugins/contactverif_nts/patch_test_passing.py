@@ -9,7 +9,7 @@ One kernel has three presets:
 | `vts-ppt-balanced` (ours) | action equals reaction | exact | cover |
 
 The option `free_end` acts at free ends of the master only, because the paper is silent about them. Everywhere else
-Box 3 stands as printed. `walk` says what each word means.
+Box 3 stands as printed. `vts_ppt_force` says what each word means.
 
 Rule for the next editor: traits are promises that the harness checks. A preset that promises more needs a proof or an
 exact test; a preset that promises "does not" names the case that shows it.
@@ -31,10 +31,10 @@ from contactverif.contract.traits import Traits, promise_at_ends
 from contactverif.geometry.block_rows import NO_NODE, Couplings, Fields, zero_matrix
 from contactverif.geometry.projection import search_tree
 from contactverif.geometry.threads import run_in_threads, share_couplings, split_range
-from contactverif_nts import vts_ppt_force, vts_ppt_tangent, walk
+from contactverif_nts import vts_ppt_force, vts_ppt_tangent
 from contactverif_nts.nts_force import AREAS, CURRENT, residual_of
 from contactverif_nts.point_contact import POINT_TRAITS, add_locking, place_points, surfaces_of, with_multipliers
-from contactverif_nts.walk import FREE_ENDS, Areas
+from contactverif_nts.vts_ppt_force import COVER, FREE_ENDS, TRUNCATE, Areas
 
 _PAPER = "Zavarise & De Lorenzis, Int. J. Numer. Meth. Engng 79 (2009) 379–416, Boxes 1–3, Appendix A"
 _PRINTED = POINT_TRAITS.revise(
@@ -76,7 +76,7 @@ class PatchTestPassing:
     consistent: bool  # The tangent is exact; else it is that of VTS-ME.
     # Areas of competence are measured in the current configuration; else in the reference configuration.
     current_area: bool
-    free_end: int  # `walk.TRUNCATE`, `walk.EXTEND` or `walk.COVER`.
+    free_end: int  # `vts_ppt_force.TRUNCATE`, `EXTEND` or `COVER`.
     tau: float  # The part of a master segment by which a foot may lie past its free end and still count.
     # How many threads share the pairing and the tangent of a large interface; the answers have the same bits.
     threads: int
@@ -92,7 +92,7 @@ class PatchTestPassing:
         surfaces = surfaces_of(interface, interface.nodes)
         balanced = self.transmission == vts_ppt_force.BALANCED
         search = self.n, self.free_end, self.tau, self.penalty, balanced
-        areas = walk.pair(state, surfaces, tree, search, self.threads)
+        areas = vts_ppt_force.pair(state, surfaces, tree, search, self.threads)
         return Pairing(dict(zip(Areas._fields, areas, strict=True)))
 
     def residual(self, interface: Interface, pairing: Pairing, z: Array, /) -> Array:
@@ -143,7 +143,7 @@ class PatchTestPassing:
             ]
         )  # (n_points, 2): P and Q
         shares = np.maximum(ends[:, 0] - ends[:, 1], 0.0) / 2
-        whole = np.array([walk.middle_of_part(point, self.n, 1.0) for point in range(self.n)])
+        whole = np.array([vts_ppt_force.middle_of_part(point, self.n, 1.0) for point in range(self.n)])
         whole = np.tile(np.column_stack([whole + 1 / self.n, whole - 1 / self.n]), (len(slave), 1))
         ends = np.where(shares[:, None] > 0, ends, whole)
         segment = np.repeat(np.arange(len(slave)), self.n)
@@ -256,7 +256,7 @@ def vts_ppt_lm(
 # No promise depends on the penalty, and a formulation is made for the penalty of each case. So promises are kept.
 @cache
 def _promises_as_printed(free_end: int, n: int) -> Traits:
-    return add_locking(_PRINTED.revise(overhang=free_end == walk.COVER), n)
+    return add_locking(_PRINTED.revise(overhang=free_end == COVER), n)
 
 
 @cache
@@ -273,11 +273,11 @@ def _balanced_promises(free_end: int, n: int, current: bool) -> Traits:
     The parts of all segments together have S and, by the lever rule, the moment of the whole area, also where the last
     one is continued. Truncated parts have S as well, but their middle lies elsewhere than that of the area.
     """
-    covers = free_end == walk.COVER
+    covers = free_end == COVER
     traits = _PRINTED.revise(
         overhang=covers,
         conserves_force=True,
-        conserves_moment=None if free_end == walk.TRUNCATE else True,
+        conserves_moment=None if free_end == TRUNCATE else True,
         area="current" if current else "reference",
         witnesses={**({} if covers else {"patch.dead-zone": "dead-zone"}), **POINT_TRAITS.evidence.witnesses},
     )

@@ -50,6 +50,7 @@ from contactverif.geometry.projection import ZERO, PointOnSegment, Vector, arm, 
 from contactverif_nts.nts_force import area_length
 from contactverif_nts.vts_ppt_force import (
     BALANCED,
+    NOT_CUT,
     Area,
     VirtualSlaveNode,
     across_parts,
@@ -58,7 +59,6 @@ from contactverif_nts.vts_ppt_force import (
     sum_of_parts,
     virtual_slave_node,
 )
-from contactverif_nts.walk import NOT_CUT
 
 WHOLE = constant(-1)  # All master segments, where the number of one may stand.
 _BEGIN = constant(0)

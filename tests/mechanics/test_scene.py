@@ -20,7 +20,7 @@ from contactverif.mechanics.scene import Scene, WholeScene, has_bodies, scene_of
 from contactverif.oracle.flat_answers import uniform_pressure_weights
 from contactverif.problems import catalogue
 from contactverif.problems.blocks import exact_unknowns, two_blocks
-from contactverif_nts import nts_force, walk
+from contactverif_nts import nts_force, vts_ppt_force
 
 
 def press_blocks(**more: Any) -> Scene:
@@ -353,8 +353,8 @@ def distances(monkeypatch: pytest.MonkeyPatch) -> Callable[[str, Case], Counts]:
     distance = python_function(projection.distance_to_segment)
     searches = [(projection, "nearest_place", python_function(projection.nearest_place))]
     searches += [(projection, name, getattr(projection, name)) for name in ("_look_at", "_look_at_leaf", "_look_below")]
-    searches += [(module, "nearest_place_from", projection.nearest_place_from) for module in (nts_force, walk)]
-    searches += [(module, "_pair_points", module._pair_points) for module in (nts_force, walk)]
+    searches += [(module, "nearest_place_from", projection.nearest_place_from) for module in (nts_force, vts_ppt_force)]
+    searches += [(module, "_pair_points", module._pair_points) for module in (nts_force, vts_ppt_force)]
 
     def count(name: str, case: Case) -> Counts:
         evaluated: list[bool] = []

@@ -44,7 +44,7 @@ for _row in (
      "multipliers[i] > 0", "nts_lm"),
     # Force and moment still balance, and nothing changes where nothing overhangs.
     ("last master segment continued past its free end", "patch.dead-zone", "patch_test_passing",
-     "search = self.n, self.free_end,", "search = self.n, walk.EXTEND,"),
+     "search = self.n, self.free_end,", "search = self.n, vts_ppt_force.EXTEND,"),
     ("first multiplier counted twice", "multipliers.rank", "point_contact", "return segment, other, slot",
      "return tuple(np.append(array, array[0]) for array in (segment, other, slot))", "nts_lm"),
     # The next two are wrong in shallow contact only, as high penalties make it. Few drawn states are like that.
@@ -73,16 +73,16 @@ for _row in (
     ("normal of each master segment for its share", "balance.force", "vts_ppt_force",
      "push(r, f, -pressure * w_f, v.normal)",
      "v = v._replace(normal=frame(node(now, f), node(now, m))[2]); push(r, f, -pressure * w_f, v.normal)"),
-    ("area of competence cut at the wrong node", "patch.flat.transmission", "walk", "cut_q = master[last, 1]",
+    ("area of competence cut at the wrong node", "patch.flat.transmission", "vts_ppt_force", "cut_q = master[last, 1]",
      "cut_q = master[last, 0]"),
     ("penalty squared", "patch.flat.transmission", "vts_ppt_force", _FORCE,
      "f_v = penalty * pressure * l_ab * (v.c_p - v.c_q) / 2"),
-    ("pushes where the gap is open", "patch.flat.transmission", "walk", "is_pressed(g,", "is_pressed(-g,"),
+    ("pushes where the gap is open", "patch.flat.transmission", "vts_ppt_force", "is_pressed(g,", "is_pressed(-g,"),
     ("virtual slave nodes at Gauss points", "patch.flat.transmission", "vts_ppt_force",
      "c = middle_of_part(i, n, unity)", "c = middle_of_part(i, n, unity) * 2 / 3**0.5"),
     ("area of competence ends at the virtual slave node", "patch.flat.transmission", "vts_ppt_force",
      "c_p, c_q = c + unity / n, c - unity / n", "c_p, c_q = c + (unity / n if i % n < n - 1 else 0), c - unity / n"),
-    ("walk ends one segment early", "patch.flat.transmission", "walk", "        last = following",
+    ("walk ends one segment early", "patch.flat.transmission", "vts_ppt_force", "        last = following",
      "        last = following; break"),
     ("pushes the wrong way", "patch.flat.transmission", "vts_ppt_force", _FORCE,
      "f_v = -pressure * l_ab * (v.c_p - v.c_q) / 2"),
@@ -126,7 +126,7 @@ for _row in (
      "v = v._replace(l_12=l_0, t=t_0, normal=n_0, g=dot(v.d, n_0))"),
     ("normal along the axis", "objectivity", "nts_force", "l_12, t, normal = frame(x_1, x_2)",
      "l_12, t, normal = frame(x_1, x_2); normal = (0 * normal[0], 1.0 + 0 * normal[1])", "vts_me"),
-    ("absolute tolerance for a gap", "units", "walk", "is_pressed(g,", "is_pressed(g - 1e-9,"),
+    ("absolute tolerance for a gap", "units", "vts_ppt_force", "is_pressed(g,", "is_pressed(g - 1e-9,"),
     ("absolute guard against a division by zero", "units", "vts_ppt_force", "xi = dot(v.d, v.t) / v.l_12",
      "xi = dot(v.d, v.t) / (v.l_12 + 1e-12)"),
     ("shortest length allowed, absolute", "units", "nts_force", "xi = dot(d, t) / l_12",
@@ -175,7 +175,7 @@ for _row in (
      "vts_me"),
 ):  # fmt: skip
     line(*_row[:5], factory=_row[5] if len(_row) > 5 else "vts_ppt_balanced")
-line("NaN on a segment seen edge-on", "purity", "walk", "_projected_length(x, master, following, t) <= 0",
+line("NaN on a segment seen edge-on", "purity", "vts_ppt_force", "_projected_length(x, master, following, t) <= 0",
      "_projected_length(x, master, following, t) < 0", factory="vts_ppt", free_end="extend")  # fmt: skip
 line("residual in one call off by 1e-6", "purity", "vts_ppt_tangent", "_add_force(push, first, f_1, v)",
      "_add_force(push, first, f_1 * (1 + 1e-6 * is_slave), v)", in_one_call=True)  # fmt: skip
@@ -184,7 +184,7 @@ line("residual in one call off by 1e-6", "purity", "vts_ppt_tangent", "_add_forc
 line(
     "share of an interior segment cut where the foot lies past its end",
     "free_end.interior",
-    "walk",
+    "vts_ppt_force",
     "                clip_q[i] = 1\n",
     "                clip_q[i] = 1\n"
     "            if dot(arm(node(x, master[last[i], 0]), q), t) < 0:\n                clip_q[i] = 0\n"

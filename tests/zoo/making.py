@@ -25,7 +25,7 @@ Make = Callable[..., Any]
 BALANCED = contactverif_nts.vts_ppt_balanced
 PACKAGE = "contactverif_nts"
 # The modules of the copy, in the order in which they import each other.
-MODULES = ("nts_force", "walk", "vts_ppt_force", "vts_ppt_tangent", "point_contact", "patch_test_passing")
+MODULES = ("nts_force", "vts_ppt_force", "vts_ppt_tangent", "point_contact", "patch_test_passing")
 
 _numbers = itertools.count()
 
