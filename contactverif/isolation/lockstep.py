@@ -17,15 +17,11 @@ Wish = Callable[[], bool]
 
 class _Lane(Generic[_Result]):
     def __init__(self, call: Callable[[], _Result]) -> None:
-        self._call = call
-        self._greenlet = greenlet(self._work)
+        self._greenlet = greenlet(call)
         self._greenlet.lane = self
         self.result: _Result | None = None
         self.wish: Wish | None = None
         self.seconds = 0.0
-
-    def _work(self) -> None:
-        self.result = self._call()
 
     @property
     def ended(self) -> bool:
@@ -34,7 +30,7 @@ class _Lane(Generic[_Result]):
     def advance(self) -> None:
         """Let the call run until it has a wish or has ended; an exception of the call is raised here."""
         start = perf_counter()
-        self._greenlet.switch()
+        self.result = self._greenlet.switch()  # That of the call, once it has ended.
         self.seconds += perf_counter() - start
 
     def wait(self, wish: Wish) -> None:

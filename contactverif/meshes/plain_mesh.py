@@ -80,8 +80,7 @@ def _unpack(stored: PackedMesh) -> PlainMesh:
     cells = {
         kind: data[np.sort(np.unique(np.sort(data), axis=0, return_index=True)[1])] for kind, data in cells.items()
     }
-    pairs = tuple(pair for pair in stored.pairs)
-    return PlainMesh(points.astype(np.float64), cells, groups, pairs, stored.materials, stored.warnings)
+    return PlainMesh(points.astype(np.float64), cells, groups, tuple(stored.pairs), stored.materials, stored.warnings)
 
 
 def _whole(kind: str, packed: PackedArray, n_points: int) -> IntArray:

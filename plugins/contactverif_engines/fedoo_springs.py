@@ -30,10 +30,8 @@ class Fedoo:
     increments: int = 1  # The number of steps in which loads and imposed displacements grow.
     tol: float = 0.1  # The part of an edge by which a node may lie past its end; 0.1 is the default of fedoo.
 
-    @property
-    def traits(self) -> EngineTraits:
-        """The statements: springs of nodes are ε̂ in the mean alone, and no uniform pressure is promised."""
-        return EngineTraits("penalty", accuracy=1e-9, load_scale=2.0**-10)
+    # Springs of nodes are ε̂ in the mean alone, and no uniform pressure is promised.
+    traits = EngineTraits("penalty", accuracy=1e-9, load_scale=2.0**-10)
 
     def solve(self, scene: SceneArrays) -> EngineAnswer:
         """Make a problem of small strains, solve it by the method of Newton and Raphson, and read its displacements."""

@@ -24,10 +24,8 @@ class NGSolve:
 
     order: int = 5  # The order of integration of the energy on each edge of the slave.
 
-    @property
-    def traits(self) -> EngineTraits:
-        """The statements: points that see the next edge of the other side are no exact integration."""
-        return EngineTraits("penalty", accuracy=1e-10)
+    # Points that see the next edge of the other side are no exact integration.
+    traits = EngineTraits("penalty", accuracy=1e-10)
 
     def solve(self, scene: SceneArrays) -> EngineAnswer:
         """Make a mesh, find the minimum of the energy by Newton's method, and return its displacements."""

@@ -27,10 +27,8 @@ class OpenSees:
     # The stiffness of all springs of a length of the surface over ε̂, in the mean: nodes of both sides have springs.
     stiffness: float = 1.0
 
-    @property
-    def traits(self) -> EngineTraits:
-        """The statements: springs of nodes are ε̂ in the mean alone, and no uniform pressure is promised."""
-        return EngineTraits("penalty", accuracy=1e-9, load_scale=2.0**-10)
+    # Springs of nodes are ε̂ in the mean alone, and no uniform pressure is promised.
+    traits = EngineTraits("penalty", accuracy=1e-9, load_scale=2.0**-10)
 
     def solve(self, scene: SceneArrays) -> EngineAnswer:
         """Make a model, solve it in a static step, and read the displacements of its nodes."""

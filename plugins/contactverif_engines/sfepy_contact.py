@@ -25,10 +25,8 @@ class SfePy:
 
     order: int = 2  # The order of integration on each edge.
 
-    @property
-    def traits(self) -> EngineTraits:
-        """The statements: points of an edge that ends beyond the other side are no exact integration."""
-        return EngineTraits("penalty", accuracy=1e-8, load_scale=2.0**-10)
+    # Points of an edge that ends beyond the other side are no exact integration.
+    traits = EngineTraits("penalty", accuracy=1e-8, load_scale=2.0**-10)
 
     def solve(self, scene: SceneArrays) -> EngineAnswer:
         """Make a problem, find its zero by Newton's method, and return its displacements."""
