@@ -17,6 +17,8 @@ from numpy.typing import NDArray
 
 from contactverif.compiler import compile_inline, compile_kernel
 from contactverif.contract.arrays import FloatArray, IntArray, compressed_matrix
+from contactverif.contract.formulation import Pairing
+from contactverif.contract.interface import Interface
 
 NumberArray = NDArray[np.int32]
 AnyIntArray = NDArray[Any]  # int32 or int64
@@ -275,3 +277,17 @@ def add_local_matrix(
                 data[np.uint64(place + width)] += local[np.uint64(2 * q + 1), np.uint64(2 * column)]
                 data[np.uint64(place + width + 1)] += local[np.uint64(2 * q + 1), np.uint64(2 * column + 1)]
                 column, place = column + 1, place + 2
+
+
+class TangentOfBoth:
+    """A formulation that computes its tangent together with its residual."""
+
+    __slots__ = ()
+
+    def residual_and_tangent(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> tuple[FloatArray, Any]:
+        """Return the residual (n_unknowns,) and its derivative; each formulation says how."""
+        raise NotImplementedError
+
+    def tangent(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> Any:
+        """Return the derivative of the residual, sparse."""
+        return self.residual_and_tangent(interface, pairing, z)[1]

@@ -19,6 +19,7 @@ from contactverif.contract.errors import ContractError, MisuseError
 from contactverif.contract.formulation import Handle, Pairing, check_penalty
 from contactverif.contract.interface import Interface
 from contactverif.contract.traits import Traits
+from contactverif.geometry.block_rows import TangentOfBoth
 from contactverif.geometry.projection import PointOnSegment, Tree, nearest_segment, node, search_tree
 from contactverif_foreign import shared_library
 from contactverif_foreign.element_pairs import walk_chains
@@ -272,12 +273,8 @@ class LibraryForces:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class LibraryElements(LibraryForces):
+class LibraryElements(TangentOfBoth, LibraryForces):
     """A formulation whose forces and tangents come from a library."""
-
-    def tangent(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> Any:
-        """Return the derivative of the residual as the library computes it, sparse."""
-        return self.residual_and_tangent(interface, pairing, z)[1]
 
     def residual_and_tangent(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> tuple[FloatArray, Any]:
         """Return the residual and its derivative from one call of each element."""

@@ -17,12 +17,13 @@ from contactverif.contract.errors import MisuseError
 from contactverif.contract.formulation import Pairing, choose
 from contactverif.contract.interface import Interface
 from contactverif.contract.traits import Evidence, Rules, Traits
+from contactverif.geometry.block_rows import TangentOfBoth
 
 # {word of the option `kind`: the packages that the search needs}
 _SEARCHES = {"bucket": ("fedoo",), "search_nearest": ("fedoo",), "ipctk": ("fedoo", "ipctk")}
 
 
-class FedooContact:
+class FedooContact(TangentOfBoth):
     """Springs at the slave nodes, each on the master element that a search of fedoo chooses.
 
     fedoo numbers all x before all y. Its normals are on the left of an element, so that master segments are turned
@@ -54,10 +55,6 @@ class FedooContact:
     def residual(self, interface: Interface, pairing: Pairing, z: FloatArray) -> FloatArray:
         """Return minus the forces on the nodes."""
         return self.residual_and_tangent(interface, pairing, z)[0]
-
-    def tangent(self, interface: Interface, pairing: Pairing, z: FloatArray) -> sparse.csr_array:
-        """Return the stiffness."""
-        return self.residual_and_tangent(interface, pairing, z)[1]
 
     def residual_and_tangent(
         self, interface: Interface, pairing: Pairing, z: FloatArray

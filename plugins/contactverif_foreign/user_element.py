@@ -23,6 +23,7 @@ from contactverif.contract.errors import ContractError, MisuseError, NonFiniteEr
 from contactverif.contract.formulation import Handle, Pairing, check_count, check_penalty, check_tau
 from contactverif.contract.interface import Interface
 from contactverif.contract.traits import Traits
+from contactverif.geometry.block_rows import TangentOfBoth
 from contactverif_foreign import shared_library
 from contactverif_foreign.element_pairs import RULES, Elements
 from contactverif_foreign.shared_library import Argument, GuardedSlot, SlotRows
@@ -81,7 +82,7 @@ class Routine:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class UserElement:
+class UserElement(TangentOfBoth):
     """A formulation whose forces and tangents come from a user element."""
 
     traits: Traits
@@ -98,10 +99,6 @@ class UserElement:
     def residual(self, interface: Interface, pairing: Pairing, z: Array, /) -> Array:
         """Compute the nodal forces (n_unknowns,), minus those of the element."""
         return self.residual_and_tangent(interface, pairing, z)[0]
-
-    def tangent(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> Any:
-        """Return the derivative of the residual as the element computes it, sparse."""
-        return self.residual_and_tangent(interface, pairing, z)[1]
 
     def residual_and_tangent(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> tuple[FloatArray, Any]:
         """Return the residual and its derivative from one call of each element."""

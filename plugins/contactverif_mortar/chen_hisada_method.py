@@ -10,14 +10,13 @@ nothing to do with where its pressure acts, so the tangent is unsymmetric.
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import sparse
 
 from contactverif.compiler import compile_maker
 from contactverif.contract.arrays import Array, BoolArray, FloatArray, IntArray
 from contactverif.contract.formulation import ContactPoints, Pairing, check_penalty, check_tau, choose
 from contactverif.contract.interface import Interface
 from contactverif.contract.traits import Traits, promise_at_ends
-from contactverif.geometry.block_rows import Couplings, Csr, NumberArray, add_block
+from contactverif.geometry.block_rows import Couplings, Csr, NumberArray, TangentOfBoth, add_block
 from contactverif.geometry.projection import (
     PointOnSegment,
     Tree,
@@ -38,7 +37,7 @@ N_POINTS = 2  # The Gauss points of a cell: exact up to degree 3, and a pressure
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class ChenHisada:
+class ChenHisada(TangentOfBoth):
     """The formulation: nodal pressures −ε̂ g_i where g_i ≤ 0 and the foot is on the master."""
 
     traits: Traits
@@ -67,12 +66,8 @@ class ChenHisada:
         at_points = (1 - c) / 2 * pressure[..., 0] + (1 + c) / 2 * pressure[..., 1]
         return forces(points, at_points, cells.local_nodes(interface), interface.n_nodes).reshape(z.shape)
 
-    def tangent(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> sparse.csr_array:
-        """Compute the derivative of the residual, sparse: Σ p_i ΔB_i + B Δp."""
-        return self.residual_and_tangent(interface, pairing, z)[1]
-
     def residual_and_tangent(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> ForcesAndTangent:
-        """Compute forces (n_unknowns,) and their derivative from the same points."""
+        """Compute forces (n_unknowns,) and their derivative, Σ p_i ΔB_i + B Δp, from the same points."""
         x, active, nearest = np.array(z).reshape(-1, 2), pairing["active"], pairing["nearest"]
         cells = near(Cells.from_pairing(pairing), active, interface)
         groups = group_nodes(

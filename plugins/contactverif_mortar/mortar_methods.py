@@ -21,7 +21,7 @@ from contactverif.contract.arrays import Array, BoolArray, FloatArray
 from contactverif.contract.formulation import ContactPoints, Pairing, check_penalty, choose
 from contactverif.contract.interface import Interface, join_rows, split_state, split_states
 from contactverif.contract.traits import Traits
-from contactverif.geometry.block_rows import Couplings, zero_matrix
+from contactverif.geometry.block_rows import Couplings, TangentOfBoth, zero_matrix
 from contactverif_mortar.cell_frame import ForcesAndTangent, NodeState, node_rows, weigh
 from contactverif_mortar.integration_cells import AREAS, CELL_TRAITS, Cells, Quadrature, near, report_nodes
 from contactverif_mortar.node_factors import Factors, NodeRows, RowGroups, check_product, group_nodes
@@ -102,7 +102,7 @@ class Weighting:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Mortar:
+class Mortar(TangentOfBoth):
     """A mortar formulation by penalty: pressures −ε̂ G_j at slave nodes that are covered and have G_j ≤ 0."""
 
     traits: Traits
@@ -121,12 +121,8 @@ class Mortar:
         pressure[:, active] = -self.penalty * weighted.with_gap[:, active] / weighted.areas[:, active]
         return weighted.forces(pressure).reshape(z.shape)
 
-    def tangent(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> sparse.csr_array:
-        """Compute the derivative of the residual, sparse: Σ p_j ΔB_j + B Δp."""
-        return self.residual_and_tangent(interface, pairing, z)[1]
-
     def residual_and_tangent(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> ForcesAndTangent:
-        """Compute forces (n_unknowns,) and their derivative from the same points."""
+        """Compute forces (n_unknowns,) and their derivative, Σ p_j ΔB_j + B Δp, from the same points."""
         rows = self._rows(interface, pairing, z, assembled=True)
         rows.multiply(0, len(rows.groups.starts) - 1)
         return rows.forces, rows.rest

@@ -9,14 +9,13 @@ Source: Zavarise & Wriggers (1998); segmentation and tangent: here.
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import sparse
 
 from contactverif.compiler import compile_inline, compile_maker
 from contactverif.contract.arrays import Array, BoolArray, FloatArray
 from contactverif.contract.formulation import ContactPoints, Pairing, check_penalty, choose
 from contactverif.contract.interface import Interface
 from contactverif.contract.traits import Traits
-from contactverif.geometry.block_rows import Couplings, Csr, Fields, NumberArray, zero_matrix
+from contactverif.geometry.block_rows import Couplings, Csr, Fields, NumberArray, TangentOfBoth, zero_matrix
 from contactverif_mortar.cell_frame import (
     N_NUMBERS,
     ForcesAndTangent,
@@ -42,7 +41,7 @@ N_POINTS = 3  # The Gauss points of a cell: exact up to degree 5, and a pressure
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class SegmentToSegment:
+class SegmentToSegment(TangentOfBoth):
     """The formulation: pressure −ε̂ g at each Gauss point of a cell where g ≤ 0."""
 
     traits: Traits
@@ -66,10 +65,6 @@ class SegmentToSegment:
         points = self.quadrature.points(interface, cells, x)
         pressure = np.where(active[mask].reshape(-1), -self.penalty * points[..., GAP], 0.0)
         return forces(points, pressure, cells.local_nodes(interface), interface.n_nodes).reshape(z.shape)
-
-    def tangent(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> sparse.csr_array:
-        """Compute the derivative of the residual, sparse."""
-        return self.residual_and_tangent(interface, pairing, z)[1]
 
     def residual_and_tangent(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> ForcesAndTangent:
         """Compute forces (n_unknowns,) and their derivative from the same points."""

@@ -22,14 +22,13 @@ Source: Duong, De Lorenzis & Sauer (2018), arXiv 1712.01179, after Sauer & De Lo
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
-from scipy import sparse
 
 from contactverif.compiler import compile_maker
 from contactverif.contract.arrays import Array, BoolArray, FloatArray, IntArray
 from contactverif.contract.formulation import ContactPoints, Pairing, check_count, check_penalty, choose
 from contactverif.contract.interface import Interface
 from contactverif.contract.traits import Traits
-from contactverif.geometry.block_rows import Couplings, NumberArray, zero_matrix
+from contactverif.geometry.block_rows import Couplings, NumberArray, TangentOfBoth, zero_matrix
 from contactverif_mortar.cell_frame import ForcesAndTangent, NodeState
 from contactverif_mortar.integration_cells import (
     AREAS,
@@ -51,7 +50,7 @@ _SOURCE = "Duong, De Lorenzis & Sauer, Comput. Methods Appl. Mech. Engrg 333 (20
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class TwoHalfPasses:
+class TwoHalfPasses(TangentOfBoth):
     """The formulation."""
 
     traits: Traits
@@ -82,10 +81,6 @@ class TwoHalfPasses:
             pushed = half_pass.sides.slave.nodes  # A half pass pushes its own surface alone.
             total[:, pushed] += half_pass.forces(pressure)[:, pushed]
         return total.reshape(z.shape)
-
-    def tangent(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> sparse.csr_array:
-        """Compute the derivative of the residual, sparse."""
-        return self.residual_and_tangent(interface, pairing, z)[1]
 
     def residual_and_tangent(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> ForcesAndTangent:
         """Compute forces (n_unknowns,) and their derivative, Σ p_j ΔB_j + B Δp on the rows of the pushed surface."""

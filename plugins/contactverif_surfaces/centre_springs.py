@@ -46,7 +46,7 @@ from contactverif.contract.errors import MisuseError
 from contactverif.contract.formulation import ContactPoints, Pairing, check_penalty
 from contactverif.contract.interface import TRIANGLE, Interface
 from contactverif.contract.traits import Traits
-from contactverif.geometry.block_rows import Couplings, Csr, Fields, NumberArray, find_entry, zero_matrix
+from contactverif.geometry.block_rows import Couplings, Csr, Fields, NumberArray, TangentOfBoth, find_entry, zero_matrix
 from contactverif_surfaces.cell_points import SURFACE_TRAITS, CellPoints, FacePairs, report_points
 from contactverif_surfaces.face_search import MOST_CORNERS, set_axes, view_face
 
@@ -410,7 +410,7 @@ def _add_row(csr: Csr, row: FloatArray, room: FloatArray, nodes: NumberArray, no
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class CentreSprings:
+class CentreSprings(TangentOfBoth):
     """The formulation: pressure −ε̂ g at the centroid of each cell where g < 0."""
 
     traits: Traits
@@ -427,10 +427,6 @@ class CentreSprings:
         forces, rooms = np.zeros_like(x), (np.empty(ROOM, x.dtype), np.empty(N_NODES, x.dtype))
         _add_forces(forces, rooms, x, (_faces(pairs), pairs.codes, pairing["active"]), self.penalty)
         return forces.reshape(z.shape)
-
-    def tangent(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> sparse.csr_array:
-        """Compute the derivative of the residual, sparse."""
-        return self.residual_and_tangent(interface, pairing, z)[1]
 
     def residual_and_tangent(
         self, interface: Interface, pairing: Pairing, z: FloatArray, /
