@@ -135,7 +135,7 @@ def _orient(
 ) -> tuple[IntArray, BoolArray, str]:
     """Return lines or faces with the body behind each, for which of them a cell shows it, and what is to be told."""
     neighbours = _neighbours(option, points, side)
-    words = _chain_words(option, points, side, neighbours)
+    words = _chain_words(option, points, side)
     one_way, by_cells = _run_one_way(option, points, side, neighbours, cells.signs(option, side))
     if n_turned := int((one_way[~by_cells] != side[~by_cells]).any(axis=1).sum()):
         words += f"{option}: turned to run as the first of its {len(side)} {_word(side)}: {n_turned}\n"
@@ -246,19 +246,15 @@ def _members(option: str, name: str, mesh: PlainMesh, cells: CellSides) -> IntAr
     return elements[0]
 
 
-def _chain_words(option: str, points: FloatArray, lines: IntArray, neighbours: list[list[tuple[int, bool]]]) -> str:
+def _chain_words(option: str, points: FloatArray, lines: IntArray) -> str:
     """Return in a line where the second of several chains begins; empty for one chain, or for faces."""
     if lines.shape[1] != SEGMENT:
         return ""
-    reached, is_reached = [0], np.arange(len(lines)) == 0
-    for line in reached:  # The list grows while it is read.
-        for other, _ in neighbours[line]:
-            if not is_reached[other]:
-                is_reached[other] = True
-                reached.append(other)
-    if is_reached.all():
+    labels = label_bodies([lines], len(points))[lines[:, 0]]
+    is_first = labels == labels[0]
+    if is_first.all():
         return ""
-    ends, starts = points[lines[is_reached]].reshape(-1, 2), points[lines[~is_reached]].reshape(-1, 2)
+    ends, starts = points[lines[is_first]].reshape(-1, 2), points[lines[~is_first]].reshape(-1, 2)
     apart = np.linalg.norm(ends[:, None] - starts, axis=-1)
     end, start = np.unravel_index(apart.argmin(), apart.shape)
     return f"{option} is several chains: no line from {describe(ends[end])} to {describe(starts[start])}\n"

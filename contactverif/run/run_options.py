@@ -407,8 +407,6 @@ def read_settings() -> RunOptions:
 def _convert(table: dict[str, Any]) -> dict[str, Any]:
     import msgspec
 
-    from contactverif.contract.errors import unknown_name_error
-
     options, values = declared_options(RunOptions), {}
     for name in table:
         if name not in (*_settings(), _TRAITS):

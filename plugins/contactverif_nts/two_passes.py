@@ -100,13 +100,9 @@ class TwoPass:
             swapped_positions = np.roll(positions, -interface.dim * interface.n_slave_nodes)
             first, second = (self._inner.n_multipliers(side) for side in (interface, swapped))
             multipliers = interface.n_unknowns + np.arange(first + second)
-            self._last_passes = (
-                interface,
-                (
-                    Pass(interface, np.concatenate([positions, multipliers[:first]]), NAMES[0]),
-                    Pass(swapped, np.concatenate([swapped_positions, multipliers[first:]]), NAMES[1]),
-                ),
-            )
+            first_pass = Pass(interface, np.concatenate([positions, multipliers[:first]]), NAMES[0])
+            second_pass = Pass(swapped, np.concatenate([swapped_positions, multipliers[first:]]), NAMES[1])
+            self._last_passes = interface, (first_pass, second_pass)
         return self._last_passes[1]
 
 

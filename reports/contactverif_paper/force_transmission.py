@@ -113,22 +113,15 @@ class ForceTable:
         """Return the table of the page; consistent forces are bold."""
         slave, master = (", ".join(f"{each:g}" for each in side) for side in (self.slave_length, self.master_length))
         rounding = max(row.rounding for row in self.all_rows)
+        rows = []
+        for row in self.all_rows:
+            on_slave, on_master = _cell(row.slave, self.exact.slave), _cell(row.master, self.exact.master)
+            rows.append((row.formulation.legend, (on_slave, _cell(row.points, ()), on_master, _printed_cell(row))))
         return PageTable.of_cells(
             f"{self.title}: nodal forces over p from left to right; slave segments {slave}; master segments {master}. "
             f"Bold: the consistent forces. Largest rounding: {rounding:.1e}",
             ("Formulation", "Slave nodes", "Virtual slave nodes", "Master nodes", "Printed for the master"),
-            [
-                (
-                    row.formulation.legend,
-                    (
-                        _cell(row.slave, self.exact.slave),
-                        _cell(row.points, ()),
-                        _cell(row.master, self.exact.master),
-                        _printed_cell(row),
-                    ),
-                )
-                for row in self.all_rows
-            ],
+            rows,
         )
 
     def group(self) -> Group:

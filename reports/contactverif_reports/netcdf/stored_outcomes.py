@@ -295,13 +295,10 @@ def _topology(case: Case) -> dict[str, Variable]:
             table[f"{name}_{axis}"] = numbers(["node"], places[:, number], meaning, schema.LENGTH)
     coordinates_of_nodes = " ".join(f"node_{axis}" for axis in axes)
     table["mesh"].attrs.update(
-        {
-            "cf_role": "mesh_topology",
-            "topology_dimension": np.int32(interface.dim - 1),
-            "node_coordinates": coordinates_of_nodes,
-            f"{cell}_node_connectivity": f"{cell}_nodes",
-            f"{cell}_dimension": cell,
-        }
+        cf_role="mesh_topology",
+        topology_dimension=np.int32(interface.dim - 1),
+        node_coordinates=coordinates_of_nodes,
+        **{f"{cell}_node_connectivity": f"{cell}_nodes", f"{cell}_dimension": cell},
     )
     table[f"{cell}_nodes"].attrs.update(cf_role=f"{cell}_node_connectivity", start_index=np.int64(0))
     table["side"].attrs.update(mesh="mesh", location=cell)

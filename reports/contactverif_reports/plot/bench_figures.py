@@ -104,9 +104,9 @@ def make_scene_figure(results: BenchResults, scene: str) -> Figure:
     return figure
 
 
-def _add_legend(figure: Figure, looks: Mapping[str, Mapping[str, Any]]) -> None:
+def _add_legend(figure: Figure, looks: Mapping[str, Mapping[str, Any]], columns: int = 2) -> None:
     handles = [Line2D([], [], label=label, **{"mfc": "none", **look}) for label, look in looks.items()]
-    figure.legend(handles=handles, loc="outside upper center", ncols=2)
+    figure.legend(handles=handles, loc="outside upper center", ncols=columns)
 
 
 def _plot_curve(
@@ -160,7 +160,7 @@ def make_cost_figure(results: BenchResults) -> Figure:
     order = bench_costs.rank(results, scene)[::-1]
     costs = [bench_costs.costs_at(results, scene, target) for target in targets]
     figure, grid = _panels((5.2, 1.3 + 0.22 * len(order)), 1, 3, sharey=True)
-    (evaluation, systems, factorisation), handles = grid[0], []
+    (evaluation, systems, factorisation), looks = grid[0], {}
     for target, each, colour, marker in zip(targets, costs, _COLOURS, _MARKERS, strict=False):
         for axes, number in zip((evaluation, factorisation), _AXES, strict=True):
             ratios = bench_costs.ratios_at(results, scene, target, number)
@@ -168,7 +168,7 @@ def make_cost_figure(results: BenchResults) -> Figure:
         finite = [(count, place) for place, name in enumerate(order) if (count := each[name].middle("systems")) < inf]
         look: dict[str, Any] = {"color": colour, "marker": marker, "linestyle": "none", "mfc": "none"}
         systems.plot(*zip(*finite, strict=True), **look)
-        handles.append(Line2D([], [], label=f"error of {bench_costs.format_share(target)}", **look))
+        looks[f"error of {bench_costs.format_share(target)}"] = look
     for place, name in enumerate(order):
         if not any(cost[name].is_usual for cost in costs):
             never: dict[str, Any] = {"ha": "center", "va": "center", "fontsize": 7, "color": "0.45"}
@@ -180,7 +180,7 @@ def make_cost_figure(results: BenchResults) -> Figure:
     factorisation.set_title(f"one factorisation,\n{REFERENCE} = 1")
     evaluation.set_yticks(range(len(order)), order, parse_math=False)
     evaluation.set_ylim(-0.6, len(order) - 0.4)
-    figure.legend(handles=handles, loc="outside upper center", ncols=2)
+    _add_legend(figure, looks)
     return figure
 
 
@@ -217,10 +217,8 @@ def make_runtime_figure(results: BenchResults) -> Figure:
     for axes, label in zip(panels[-1], ("all evaluations / ms", "all factorisations / ms"), strict=True):
         axes.set_xlabel(label)
     figure.supylabel("share of errors and instances that are reached", fontsize=8.5)
-    handles = [Line2D([], [], label=name, color=pen["color"]) for name, pen in pens.items()]
-    if len(pens) < len(results.formulations):
-        handles.append(Line2D([], [], label="others", **_GREY))
-    figure.legend(handles=handles, loc="outside upper center", ncols=3)
+    others = {"others": _GREY} if len(pens) < len(results.formulations) else {}
+    _add_legend(figure, {name: {"color": pen["color"]} for name, pen in pens.items()} | others, columns=3)
     return figure
 
 
