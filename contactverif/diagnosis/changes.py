@@ -17,7 +17,7 @@ from contactverif.diagnosis.flat_state import DEPTH, PENALTY, SAME, grid, residu
 
 _SLOPE, _TILTED_DEPTH = 2.0**-3, 2.0**-3
 _APART, _BEHIND = 1.0, 3.0  # How far a pair opens, and another surface lies behind the master.
-_ASIDE, _FAR, _FARTHEST = 64.0, 2.0**10, 24
+_ASIDE, _FAR, _FARTHEST = 64.0, 10, 24  # The last two are powers of 2.
 _MANY = {PLANE: 40, PLANE + 1: 12}  # Copies of a pair, by the number of coordinates.
 _SCALES = range(4, 41, 4)  # The mesh is as many times smaller, and then larger, as 2 to these powers.
 # A power of two changes no rounding, and an absolute length in the code soon changes forces by far more than this.
@@ -40,7 +40,7 @@ class _Change(NamedTuple):
     words: str
     pair: _Pair
     rows: Sequence[IntArray]  # The nodes of either side, in the order that they had before.
-    turn: FloatArray | None = None  # (dim, dim) By which all positions are multiplied.
+    turn: FloatArray  # (dim, dim) By which all positions are multiplied.
 
 
 def diagnose_changes(subject: Subject) -> str:
@@ -62,10 +62,9 @@ def _differences(subject: Subject, corners: int) -> Iterator[str]:
         # The sum over a cell may depend on the corner at which its triangles meet, where it is not exact.
         forces, unsure = _forces(subject, pair), corners == QUADRILATERAL and np.ptp(pair[0].current[:, -1]) > 0
         for words, changed, rows, turn in _changes(subject, pair):
-            found = [part[numbers] for part, numbers in zip(_forces(subject, changed), rows, strict=True)]
-            found = found if turn is None else [part @ turn.T for part in found]
-            if not same(np.vstack(found), np.vstack(forces)) and not (unsure and words in _BY_CORNERS):
-                yield f"{words}, the forces of a {state} are others{_where(found, forces)}"
+            others = [part[numbers] @ turn.T for part, numbers in zip(_forces(subject, changed), rows, strict=True)]
+            if not same(np.vstack(others), np.vstack(forces)) and not (unsure and words in _BY_CORNERS):
+                yield f"{words}, the forces of a {state} are others{_name_nodes(others, forces)}"
         if rules.enforcement == "penalty" and rules.penalty is not None and not rules.own_law:
             yield from _diagnose_scale(subject, pair)
         if subject.traits.promises.conserves_force:
@@ -85,21 +84,15 @@ def _states(corners: int, reach: float) -> dict[str, _Pair]:
     states: dict[str, _Pair] = {}
     for words, lower, slope, depth, bend in (
         ("flat state", inside, 0.0, DEPTH, 0.0),
-        ("tilted slave", inside, _SLOPE * reach, _TILTED_DEPTH * reach, 0.0),
-        (
-            "slave that is bent, partly open, and reaches past an end of the master",
-            short,
-            _SLOPE * reach,
-            0.1 * reach,
-            2.0**-5 * reach,
-        ),
+        ("tilted slave", inside, _SLOPE, _TILTED_DEPTH, 0.0),
+        ("slave that is bent, partly open, and past an end of the master", short, _SLOPE, 0.1, 2.0**-5),
     ):
         sides = []
         for number, (points, faces) in enumerate((upper, lower)):
             current = points.copy()
-            current[:, -1] += bend * np.cos(7.0 * np.arange(len(points)))
+            current[:, -1] += reach * bend * np.cos(7.0 * np.arange(len(points)))
             if number == 0:
-                current[:, -1] += slope * (points[:, 0] - 1.0) - depth
+                current[:, -1] += reach * (slope * (points[:, 0] - 1.0) - depth)
                 faces = faces[:, ::-1]
             sides.append(_Side(points, current, faces))
         states[words] = sides
@@ -109,11 +102,11 @@ def _states(corners: int, reach: float) -> dict[str, _Pair]:
 def _part(subject: Subject, pair: _Pair, share: float) -> _Pair:
     """Return a pair whose sides lie at least a share of the distance apart at which a barrier begins."""
     slave, master = pair
-    unit = min(np.linalg.norm(np.diff(side.reference[side.faces[:, :2]], axis=1), axis=2).min() for side in pair)
-    distance = (subject.traits.rules.activation or 0.0) * (
-        unit if subject.traits.rules.activation_unit == "segment" else 1.0
-    )
-    lift = master.current[:, -1].max() - slave.current[:, -1].min() + share * distance
+    distance = share * float(subject.traits.rules.activation or 0.0)
+    if subject.traits.rules.activation_unit == "segment":
+        edges = (np.diff(side.reference[side.faces[:, :2]], axis=1) for side in pair)
+        distance *= min(np.linalg.norm(edge, axis=2).min() for edge in edges)
+    lift = master.current[:, -1].max() - slave.current[:, -1].min() + distance
     return [slave._replace(current=slave.current + lift * np.eye(slave.current.shape[1])[-1]), master]
 
 
@@ -139,29 +132,29 @@ def _forces(subject: Subject, pair: _Pair) -> list[FloatArray]:
 
 
 def _changes(subject: Subject, pair: _Pair) -> Iterator[_Change]:
-    rules = subject.traits.rules
+    rules, stable = subject.traits.rules, subject.traits.promises.translation_stable
     slave, master = pair
-    dim, word = slave.reference.shape[1], "segments" if slave.faces.shape[1] == SEGMENT else "faces"
-    along, up = np.eye(dim)[[0, -1]]
-    same_rows = [np.arange(len(side.reference)) for side in pair]
-    orders = [np.roll(rows[::-1], 1) for rows in same_rows]
+    is_flat, dim = np.ptp(slave.current[:, -1]) == 0, slave.reference.shape[1]
+    (along, up), rest = np.eye(dim)[[0, -1]], np.eye(dim)
+    rows = [np.arange(len(side.reference)) for side in pair]
+    orders = [np.roll(numbers[::-1], 1) for numbers in rows]
     renumbered = [
         _Side(side.reference[order], side.current[order], np.argsort(order)[side.faces])
         for side, order in zip(pair, orders, strict=True)
     ]
-    yield _Change("if its nodes have other numbers", renumbered, [np.argsort(order) for order in orders])
+    yield _Change("if its nodes have other numbers", renumbered, [np.argsort(order) for order in orders], rest)
+    before = [_join([_shift(side, -_ASIDE * along), side]) for side in pair]
+    yield _Change("behind another pair in its numbers", before, [numbers + len(numbers) for numbers in rows], rest)
+    word = "segments" if slave.faces.shape[1] == SEGMENT else "faces"
     others = {
         f"if its {word} stand in another order": [side._replace(faces=side.faces[::-1]) for side in pair],
         _BY_CORNERS[0]: [side._replace(faces=np.roll(side.faces, dim - PLANE, axis=1)) for side in pair],
-        f"if all is moved by {_FAR:g}": [_shift(side, _FAR) for side in pair],
         "if the reference is moved, and the state is not": [
-            side._replace(reference=side.reference + _FAR) for side in pair
+            side._replace(reference=side.reference + _ASIDE) for side in pair
         ],
     }
-    if subject.traits.promises.translation_stable and np.ptp(slave.current[:, -1]) == 0:
-        others[f"if all is moved by 2^{_FARTHEST}, which rounds nothing"] = [
-            _shift(side, 2.0**_FARTHEST) for side in pair
-        ]
+    far = 2.0 ** (_FARTHEST if stable and is_flat else _FAR)  # It rounds nothing where the state is flat.
+    others[f"if all is moved by {far:g}"] = [_shift(side, far) for side in pair]
     if rules.area == "current" and rules.penalty == "distributed" and not rules.own_law:
         of_now = [side._replace(reference=side.current) for side in pair]
         others["if the reference is as the state is, though areas are current ones"] = of_now
@@ -172,33 +165,18 @@ def _changes(subject: Subject, pair: _Pair) -> Iterator[_Change]:
     apart[0] = apart[0]._replace(current=apart[0].current + _APART * up)
     others["beside a pair that is apart"] = [_join(list(sides)) for sides in zip(pair, apart, strict=True)]
     # On tilted states a surface that is cut where this one has nodes may have other sums.
-    is_spring = rules.enforcement != "barrier" and subject.traits.abilities.reach is None
-    if is_spring and np.ptp(slave.current[:, -1]) == 0:
-        others[f"if another surface lies {_BEHIND:g} behind the master"] = [
-            slave,
-            _join([master, _shift(master, -_BEHIND * up)]),
-        ]
-    yield from (_Change(words, changed, same_rows) for words, changed in others.items())
-    first = [_join([_shift(side, -_ASIDE * along), side]) for side in pair]
-    rows = [rows + len(rows) for rows in same_rows]
-    yield _Change("behind another pair in its numbers", first, rows)
-    for words, turn in _turns(dim).items():
+    if is_flat and rules.enforcement != "barrier" and subject.traits.abilities.reach is None:
+        both = _join([master, _shift(master, -_BEHIND * up)])
+        others[f"if another surface lies {_BEHIND:g} behind the master"] = [slave, both]
+    yield from (_Change(words, changed, rows, rest) for words, changed in others.items())
+    little = rest.copy()
+    little[np.ix_([0, -1], [0, -1])] = [[0.8, 0.6], [-0.6, 0.8]]
+    half, mirror = np.diag([-1.0, *[1.0] * (dim - PLANE), -1.0]), np.diag([-1.0, *[1.0] * (dim - 1)])
+    turns = {"if all is turned by 180°": half, "if all is turned by 37°": little, _BY_CORNERS[1]: mirror}
+    for words, turn in turns.items():
         flip = int(np.rint(np.linalg.det(turn)))
         turned = [_Side(x @ turn, z @ turn, faces[:, ::flip]) for x, z, faces in pair]
-        yield _Change(words, turned, same_rows, turn)
-
-
-def _turns(dim: int) -> dict[str, FloatArray]:
-    little = np.eye(dim)
-    little[np.ix_([0, -1], [0, -1])] = [[0.8, 0.6], [-0.6, 0.8]]
-    return {
-        "if all is turned by 180°": np.diag([-1.0, *[1.0] * (dim - PLANE), -1.0]),
-        "if all is turned by 37°": little,
-        "if x becomes y, and y −x" if dim == PLANE else "if x becomes y, y becomes z, and z x": (
-            np.array([[0.0, 1.0], [-1.0, 0.0]]) if dim == PLANE else np.roll(np.eye(dim), 1, axis=1)
-        ),
-        _BY_CORNERS[1]: np.diag([-1.0, *[1.0] * (dim - 1)]),
-    }
+        yield _Change(words, turned, rows, turn)
 
 
 def _shift(side: _Side, way: FloatArray | float) -> _Side:
@@ -211,37 +189,37 @@ def _join(sides: list[_Side]) -> _Side:
     return _Side(np.vstack([side.reference for side in sides]), np.vstack([side.current for side in sides]), faces)
 
 
-def _where(found: list[FloatArray], forces: list[FloatArray]) -> str:
+def _name_nodes(others: list[FloatArray], forces: list[FloatArray]) -> str:
     """Return the nodes whose forces differ, if they are few, and the factor, if there is one."""
     size = SAME * max(np.abs(part).max() for part in forces)
-    wrong = [np.flatnonzero(np.abs(a - b).max(axis=1) > size) for a, b in zip(found, forces, strict=True)]
-    a, b = (np.concatenate([part[w].ravel() for part, w in zip(of, wrong, strict=True)]) for of in (found, forces))
-    factor = float(a @ b / (b @ b)) if b.any() else np.nan
+    wrong = [np.flatnonzero(np.abs(a - b).max(axis=1) > size) for a, b in zip(others, forces, strict=True)]
+    a, b = (np.vstack([part[w] for part, w in zip(side, wrong, strict=True)]) for side in (others, forces))
+    factor = float((a * b).sum() / (b * b).sum()) if b.any() else np.nan
     text = f", {factor:.4g} times those before" if np.abs(a - factor * b).max() <= size else ""
-    named = [spell(f"{side} node", w) for side, w in zip(("slave", "master"), wrong, strict=True) if 0 < len(w) <= _FEW]
-    all_named = len(named) == sum(len(w) > 0 for w in wrong)
-    sides = "" if all(map(len, wrong)) else f", on the {'slave' if len(wrong[0]) else 'master'} alone"
-    return text + (f", at {' and '.join(named)}" if all_named else sides)
+    sides = {side: numbers for side, numbers in zip(("slave", "master"), wrong, strict=True) if len(numbers)}
+    if max(map(len, wrong)) <= _FEW:
+        return f"{text}, at {' and '.join(spell(f'{side} node', numbers) for side, numbers in sides.items())}"
+    return text if len(sides) > 1 else f"{text}, on the {next(iter(sides))} alone"
 
 
 def _diagnose_scale(subject: Subject, pair: _Pair) -> Iterator[str]:
     dim = pair[0].reference.shape[1]  # A force is ε̂ |g| times a length or an area.
 
-    def scaled(factor: float) -> FloatArray:
+    def scale(factor: float) -> FloatArray:
         sides = [_Side(x * factor, z * factor, faces) for x, z, faces in pair]
         forces: FloatArray = np.vstack(_forces(subject, sides)) / factor**dim
         return forces
 
-    reference, first = scaled(1.0), scaled(2.0**4)
+    reference, first = scale(1.0), scale(2.0**4)
     ratio = float((first * reference).sum() / (reference**2).sum())
     if abs(ratio - 1.0) > SAME and same(first, ratio * reference):
         power = np.log2(abs(ratio)) / 4
-        if same(scaled(2.0**8), 2.0 ** (8 * power) * reference):
+        if same(scale(2.0**8), 2.0 ** (8 * power) * reference):
             words = f"the forces grow like the size of the mesh to the power {dim + power:.3g}, and should like {dim}"
             yield f"{words}: is a length missing, or counted twice?"
     for (sign, word), exponent in product(((-1, "smaller"), (1, "larger")), _SCALES):
         factor = 2.0 ** (sign * exponent)
-        if np.abs(scaled(factor) - reference).max() > _SAME_SCALED * np.abs(reference).max():
+        if np.abs(scale(factor) - reference).max() > _SAME_SCALED * np.abs(reference).max():
             sizes = f"gaps of {factor * DEPTH:.1e} on segments of about {factor:.1e}"
             yield f"forces do not scale with a mesh 2^{exponent} times {word} ({sizes}): look for an absolute length"
 

@@ -51,7 +51,7 @@ class FlatState:
 
     @property
     def in_plane(self) -> bool:
-        """Whether faces are segments."""
+        """True for segments, False for faces in space."""
         return self.case.interface.dim == PLANE
 
     @property

@@ -57,7 +57,7 @@ IN_INCLUDED = {
     "barrier that stops growing at 1e-7 of its reach": "do not grow where a gap of 2^-24",
     # In space.
     "triangles around the first corner of a cell": "if its faces begin at another corner",
-    "last face taken unchecked for a node that faces none": "reaches past an end of the master",
+    "last face taken unchecked for a node that faces none": "past an end of the master",
     "force along z": "if all is turned by 37°",
     "clip that loses a corner": "their sum is 0.9057 times",
     "penetrations below 1e-9 left open": "look for an absolute length",
