@@ -143,8 +143,6 @@ def _changes(subject: Subject, pair: _Pair) -> Iterator[_Change]:
         for side, order in zip(pair, orders, strict=True)
     ]
     yield _Change("if its nodes have other numbers", renumbered, [np.argsort(order) for order in orders], rest)
-    before = [_join([_shift(side, -_ASIDE * along), side]) for side in pair]
-    yield _Change("behind another pair in its numbers", before, [numbers + len(numbers) for numbers in rows], rest)
     word = "segments" if slave.faces.shape[1] == SEGMENT else "faces"
     others = {
         f"if its {word} stand in another order": [side._replace(faces=side.faces[::-1]) for side in pair],
@@ -169,6 +167,8 @@ def _changes(subject: Subject, pair: _Pair) -> Iterator[_Change]:
         both = _join([master, _shift(master, -_BEHIND * up)])
         others[f"if another surface lies {_BEHIND:g} behind the master"] = [slave, both]
     yield from (_Change(words, changed, rows, rest) for words, changed in others.items())
+    before = [_join([_shift(side, -_ASIDE * along), side]) for side in pair]
+    yield _Change("behind another pair in its numbers", before, [numbers + len(numbers) for numbers in rows], rest)
     little = rest.copy()
     little[np.ix_([0, -1], [0, -1])] = [[0.8, 0.6], [-0.6, 0.8]]
     half, mirror = np.diag([-1.0, *[1.0] * (dim - PLANE), -1.0]), np.diag([-1.0, *[1.0] * (dim - 1)])
