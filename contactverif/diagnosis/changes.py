@@ -4,7 +4,7 @@ The forces of a right formulation turn, move and grow with the state, and do not
 Each of three states, from a flat one to one with ends and openings, is asked again after each change.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from itertools import product
 from typing import NamedTuple
 
@@ -52,6 +52,20 @@ def diagnose_changes(subject: Subject) -> str:
     return next((text for corners in kinds for text in _differences(subject, corners)), "")
 
 
+def find_kept_mesh(subject: Subject) -> str:
+    """Return whether a mesh gets what is kept of another one with as many nodes; empty if it does not."""
+    if subject.traits.rules.enforcement != "penalty":
+        return ""
+    corners, answers = SEGMENT if subject.traits.abilities.in_plane else max(subject.traits.abilities.faces), []
+    for n_copies, factor in ((5, 1.0), (5, 2.0), (7, 2.0)):
+        pair = [_scale(_copy(side, range(n_copies)), factor) for side in _states(corners, 1.0)["flat state"]]
+        answers.append(_forces(subject, pair)[0][:3] / factor ** pair[0].reference.shape[1])
+    first, second, of_more = answers
+    if same(of_more, first) and not same(second, first):
+        return "something is kept by numbers of nodes or segments: a mesh gets it of another one with as many"
+    return ""
+
+
 def _differences(subject: Subject, corners: int) -> Iterator[str]:
     rules = subject.traits.rules
     if rules.enforcement == "barrier":
@@ -87,15 +101,11 @@ def _states(corners: int, reach: float) -> dict[str, _Pair]:
         ("tilted slave", inside, _SLOPE, _TILTED_DEPTH, 0.0),
         ("slave that is bent, partly open, and past an end of the master", short, _SLOPE, 0.1, 2.0**-5),
     ):
-        sides = []
-        for number, (points, faces) in enumerate((upper, lower)):
-            current = points.copy()
-            current[:, -1] += reach * bend * np.cos(7.0 * np.arange(len(points)))
-            if number == 0:
-                current[:, -1] += reach * (slope * (points[:, 0] - 1.0) - depth)
-                faces = faces[:, ::-1]
-            sides.append(_Side(points, current, faces))
-        states[words] = sides
+        slave, master = upper[0].copy(), lower[0].copy()
+        for current in (slave, master):
+            current[:, -1] += reach * bend * np.cos(7.0 * np.arange(len(current)))
+        slave[:, -1] += reach * (slope * (slave[:, 0] - 1.0) - depth)
+        states[words] = [_Side(upper[0], slave, upper[1][:, ::-1]), _Side(lower[0], master, lower[1])]
     return states
 
 
@@ -147,18 +157,14 @@ def _changes(subject: Subject, pair: _Pair) -> Iterator[_Change]:
     others = {
         f"if its {word} stand in another order": [side._replace(faces=side.faces[::-1]) for side in pair],
         _BY_CORNERS[0]: [side._replace(faces=np.roll(side.faces, dim - PLANE, axis=1)) for side in pair],
-        "if the reference is moved, and the state is not": [
-            side._replace(reference=side.reference + _ASIDE) for side in pair
-        ],
     }
     far = 2.0 ** (_FARTHEST if stable and is_flat else _FAR)  # It rounds nothing where the state is flat.
     others[f"if all is moved by {far:g}"] = [_shift(side, far) for side in pair]
     if rules.area == "current" and rules.penalty == "distributed" and not rules.own_law:
         of_now = [side._replace(reference=side.current) for side in pair]
         others["if the reference is as the state is, though areas are current ones"] = of_now
-    for words, numbers in (("one more pair", [0, 1]), (f"{_MANY[dim]} more pairs", range(_MANY[dim] + 1))):
-        copies = [_join([_shift(side, _ASIDE * number * along) for number in numbers]) for side in pair]
-        others[f"beside {words} of the same kind"] = copies
+    for words, numbers in (("one more pair", range(2)), (f"{_MANY[dim]} more pairs", range(_MANY[dim] + 1))):
+        others[f"beside {words} of the same kind"] = [_copy(side, numbers) for side in pair]
     apart = [_shift(side, _ASIDE * along) for side in pair]
     apart[0] = apart[0]._replace(current=apart[0].current + _APART * up)
     others["beside a pair that is apart"] = [_join(list(sides)) for sides in zip(pair, apart, strict=True)]
@@ -167,7 +173,7 @@ def _changes(subject: Subject, pair: _Pair) -> Iterator[_Change]:
         both = _join([master, _shift(master, -_BEHIND * up)])
         others[f"if another surface lies {_BEHIND:g} behind the master"] = [slave, both]
     yield from (_Change(words, changed, rows, rest) for words, changed in others.items())
-    before = [_join([_shift(side, -_ASIDE * along), side]) for side in pair]
+    before = [_copy(side, (-1, 0)) for side in pair]
     yield _Change("behind another pair in its numbers", before, [numbers + len(numbers) for numbers in rows], rest)
     little = rest.copy()
     little[np.ix_([0, -1], [0, -1])] = [[0.8, 0.6], [-0.6, 0.8]]
@@ -181,6 +187,14 @@ def _changes(subject: Subject, pair: _Pair) -> Iterator[_Change]:
 
 def _shift(side: _Side, way: FloatArray | float) -> _Side:
     return side._replace(reference=side.reference + way, current=side.current + way)
+
+
+def _copy(side: _Side, places: Iterable[int]) -> _Side:
+    return _join([_shift(side, _ASIDE * place * np.eye(side.reference.shape[1])[0]) for place in places])
+
+
+def _scale(side: _Side, factor: float) -> _Side:
+    return side._replace(reference=side.reference * factor, current=side.current * factor)
 
 
 def _join(sides: list[_Side]) -> _Side:
@@ -206,8 +220,7 @@ def _diagnose_scale(subject: Subject, pair: _Pair) -> Iterator[str]:
     dim = pair[0].reference.shape[1]  # A force is ε̂ |g| times a length or an area.
 
     def scale(factor: float) -> FloatArray:
-        sides = [_Side(x * factor, z * factor, faces) for x, z, faces in pair]
-        forces: FloatArray = np.vstack(_forces(subject, sides)) / factor**dim
+        forces: FloatArray = np.vstack(_forces(subject, [_scale(side, factor) for side in pair])) / factor**dim
         return forces
 
     reference, first = scale(1.0), scale(2.0**4)

@@ -10,7 +10,7 @@ from contactverif.contract.interface import Interface, Surface
 from contactverif.contract.result import OF_TANGENT
 from contactverif.contract.subject import CheckedFormulation, Subject
 from contactverif.contract.traits import PatchPromises
-from contactverif.diagnosis.changes import diagnose_changes
+from contactverif.diagnosis.changes import diagnose_changes, find_kept_mesh
 from contactverif.diagnosis.flat_state import PENALTY, flat_state, residual_of
 from contactverif.diagnosis.force_patterns import diagnose_forces, find_lost_places
 from contactverif.diagnosis.matching_pairs import diagnose_matching
@@ -42,7 +42,7 @@ def diagnose(subject: Subject, property_id: str, others: Sequence[str] = ()) -> 
             if subject.traits.rules.own_law:  # Patterns are of forces in proportion to the gap.
                 return diagnose_changes(subject) or diagnose_tangent(subject)
             springs = subject.traits.rules.enforcement == "penalty" and subject.traits.abilities.in_plane
-            if springs and (text := _diagnose_numbering(subject)):
+            if text := (springs and _diagnose_numbering(subject)) or find_kept_mesh(subject):
                 return text
             if property_id.startswith("purity"):  # Other patterns mean nothing then.
                 return _diagnose_memory(subject) if springs else ""

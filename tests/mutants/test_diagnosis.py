@@ -3,6 +3,7 @@
 import csv
 import re
 from pathlib import Path
+from typing import ClassVar
 
 import bugs_campaign
 import numpy as np
@@ -205,6 +206,19 @@ class Backwards(Nodes):
 def test_forces_that_are_lost_and_numbers_that_make_nan_are_named(make: type[Nodes], words: str) -> None:
     run_of_all = run([Subject("nodes", make)], load_properties(["balance.force"]), examples=3, seed=1, shrink="none")
     assert re.search(words, run_of_all.diagnoses["nodes"])
+
+
+class ByNumbers(Springs):
+    """Lengths of segments are kept in the process by how many there are."""
+
+    kept: ClassVar[dict[tuple[int, int], np.ndarray]] = {}
+
+    def weights(self, length, slave_segment, n_segments):
+        return self.kept.setdefault((n_segments, len(length)), length.real) / 2
+
+
+def test_what_is_kept_of_another_mesh_is_named() -> None:
+    assert "something is kept by numbers" in diagnose(Subject("by numbers", ByNumbers), "patch.flat.resultant")
 
 
 class Linear:
