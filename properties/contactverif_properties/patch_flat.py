@@ -509,8 +509,10 @@ def _tolerance(case: Case, traits: Traits) -> float:
     cases=Cases.random(_resultant_cases),
     cases_in_space=Cases.random(_resultant_plane_cases),
     kinds=(TILTED, STEEP, SLIGHT),
-    # Of two passes each may push along the normal of the other surface.
-    promise=lambda traits: True if traits.rules.force_along and not traits.promises.unbiased else None,
+    # Of two passes that balance each may push along the normal of the other surface.
+    promise=lambda t: (
+        True if t.rules.force_along and not (t.promises.unbiased and t.promises.conserves_force) else None
+    ),
     applicable=lambda traits: refuse_unstated(traits, "force_along"),
 )
 def patch_tilted_resultant(case: Case, subject: Subject) -> Measurement:

@@ -148,7 +148,7 @@ def test_parts_that_a_plugin_does_provide() -> None:
         ({"residual": lambda interface, pairing, z: np.nan * z}, "residual: nan in"),
         ({"pair": lambda interface, z: [1]}, "pair: returned a list"),
         ({"pair": lambda interface, z: {"xi": z}}, "pair: 'xi' is dtype float64"),
-        ({"pair": lambda interface, z: {"a": np.array([99])}}, "pair: 'a' holds 99"),
+        ({"pair": lambda interface, z: {"a": np.array([10**9])}}, "pair: 'a' holds 1000000000"),
     ],
 )
 def test_a_broken_contract_is_that_of_the_inner_formulation(parts: dict[str, Any], message: str) -> None:
