@@ -211,10 +211,10 @@ def test_forces_that_are_lost_and_numbers_that_make_nan_are_named(make: type[Nod
 class ByNumbers(Springs):
     """Lengths of segments are kept in the process by how many there are."""
 
-    kept: ClassVar[dict[tuple[int, int], np.ndarray]] = {}
+    lengths: ClassVar[dict[tuple[int, int], np.ndarray]] = {}
 
     def weights(self, length, slave_segment, n_segments):
-        return self.kept.setdefault((n_segments, len(length)), length.real) / 2
+        return self.lengths.setdefault((n_segments, len(length)), length.real) / 2
 
 
 def test_what_is_kept_of_another_mesh_is_named() -> None:
