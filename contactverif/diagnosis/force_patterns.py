@@ -176,9 +176,8 @@ def _segment_pattern(state: FlatState, pushes: FloatArray, side: int) -> str:
     segments = np.unique(numbers)
     parts = np.stack([state.pieces[numbers == segment].sum(axis=0) for segment in segments], axis=1)
     factors: FloatArray = np.linalg.lstsq(parts, pushes, rcond=None)[0]
-    if not same(parts @ factors, pushes) or (wrong := ~equal(factors, np.ones(len(factors)))).all():
-        return ""
-    if factors.min() < -SAME:  # On few nodes factors are not unique.
+    wrong = ~equal(factors, np.ones(len(factors)))
+    if not same(parts @ factors, pushes) or wrong.all() or factors.min() < -SAME:  # On few nodes none is unique.
         return ""
     name, word = ("slave", "master")[side], "segment" if state.in_plane else "face"
     missed = [int(segment) for segment, factor in zip(segments, factors, strict=True) if abs(factor) < SAME]

@@ -10,6 +10,7 @@ In the plane a node has two unknowns, 2 v and 2 v + 1. A multiplier stands behin
 coupling is the multiplier i, whose unknown is 2 n_nodes + i. In space a pattern has three unknowns for each node.
 """
 
+from abc import abstractmethod
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -284,9 +285,9 @@ class TangentOfBoth:
 
     __slots__ = ()
 
+    @abstractmethod
     def residual_and_tangent(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> tuple[FloatArray, Any]:
         """Return the residual (n_unknowns,) and its derivative; each formulation says how."""
-        raise NotImplementedError
 
     def tangent(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> Any:
         """Return the derivative of the residual, sparse."""
