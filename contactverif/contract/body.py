@@ -13,6 +13,7 @@ import numpy as np
 
 from contactverif.contract.arrays import BoolArray, FloatArray, IntArray, as_array, check_shape, freeze
 from contactverif.contract.errors import MisuseError
+from contactverif.contract.interface import PLANE, SPACE
 
 _Fault = tuple[str, str, str]  # The attribute of a `Body` that is wrong, what was found and what is needed.
 _POISSON = "Poisson's ratio above −1 and below 0.5 (an incompressible body has no stiffness matrix in displacements)"
@@ -20,38 +21,42 @@ _POISSON = "Poisson's ratio above −1 and below 0.5 (an incompressible body has
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Body:
-    """A linear elastic body in plane strain, or a rigid surface.
+    """A linear elastic body in plane strain or in space, or a rigid surface.
 
     A body without cells is rigid: each of its nodes is a boundary condition. For a rectangle and for a rigid surface
     there are `block` and `rigid_surface`, for a mesh of scikit-fem `body_from_mesh`.
 
     Attributes
     ----------
-    nodes : FloatArray, shape (n_nodes, 2)
-        The reference positions, a length each.
-    cells : IntArray, shape (n_cells, 3 or 4)
-        The node numbers of each triangle or quadrilateral, counter-clockwise; shape (0, 4) for a rigid body.
-    contact : IntArray, shape (n_segments, 2)
-        The edges that may touch another body, each with this body on its left.
+    nodes : FloatArray, shape (n_nodes, 2 or 3)
+        The reference positions, a length each; two coordinates are a body in the plane, three one in space.
+    cells : IntArray, shape (n_cells, n_corners)
+        The node numbers of each triangle or quadrilateral, counter-clockwise, or of each tetrahedron or hexahedron. In
+        space the first face (3 or 4 nodes) runs counter-clockwise seen from the other nodes, and the opposite one
+        of a hexahedron follows in the same order. A rigid body has none.
+    contact : IntArray, shape (n_faces, n_corners)
+        The edges that may touch another body, each with this body on its left; in space the triangles or
+        quadrilaterals, counter-clockwise seen from outside.
     young : float
         Young's modulus E > 0, force per length squared. A rigid body ignores it.
     poisson : float
         Poisson's ratio, −1 < ν < 1/2. A rigid body ignores it.
-    fixed : BoolArray, shape (n_nodes, 2)
+    fixed : BoolArray, shape (n_nodes, dim)
         True for each component of the displacement that is imposed, in the body's axes. Optional: nothing is fixed.
-    imposed : FloatArray, shape (n_nodes, 2)
+    imposed : FloatArray, shape (n_nodes, dim)
         The displacements imposed on fixed components, a length each; 0 elsewhere. Optional: 0.
-    load : FloatArray, shape (n_nodes, 2)
-        The nodal forces, in the body's axes, per unit of thickness. Optional: 0.
-    axis : FloatArray, shape (2,)
-        The unit vector of the body's first axis. The second is a quarter turn counter-clockwise from it.
-    start : FloatArray, shape (2,)
-        The displacement, in the body's axes, of all free nodes in the first guess of a solution.
+    load : FloatArray, shape (n_nodes, dim)
+        The nodal forces, in the body's axes, in the plane per unit of thickness. Optional: 0.
+    axis : FloatArray, shape (2,) or (2, 3)
+        The unit vector of the body's first axis. The second is a quarter turn counter-clockwise from it. In space the
+        first two axes, to which the third is normal. Optional: the global ones.
+    start : FloatArray, shape (dim,)
+        The displacement, in the body's axes, of all free nodes in the first guess of a solution. Optional: 0.
     name : str
         The name in messages and drawings.
     contact_nodes : IntArray, shape (n_contact_nodes,)
         The numbers of the nodes on the contact boundary, ascending. Computed by the constructor.
-    frame : FloatArray, shape (2, 2)
+    frame : FloatArray, shape (dim, dim)
         The rotation from the body's axes to the global ones; its columns are the axes. Computed by the constructor.
 
     Raises
@@ -68,31 +73,37 @@ class Body:
     fixed: BoolArray = field(default_factory=lambda: np.zeros(0, bool))
     imposed: FloatArray = field(default_factory=lambda: np.zeros(0))
     load: FloatArray = field(default_factory=lambda: np.zeros(0))
-    axis: FloatArray = field(default_factory=lambda: np.array([1.0, 0.0]))
-    start: FloatArray = field(default_factory=lambda: np.zeros(2))
+    axis: FloatArray = field(default_factory=lambda: np.zeros(0))
+    start: FloatArray = field(default_factory=lambda: np.zeros(0))
     name: str = "body"
     contact_nodes: IntArray = field(init=False)
     frame: FloatArray = field(init=False)
 
     def __post_init__(self) -> None:
-        self._set_array("nodes", np.float64, (-1, 2))
-        n_nodes, cells = len(self.nodes), as_array(f"{self.name}: cells", self.cells).shape
-        n_corners = cells[1] if len(cells) == 2 and cells[1] in (3, 4) else 4
-        self._set_array("cells", np.int64, (-1, n_corners), default=0)
-        self._set_array("contact", np.int64, (-1, 2))
-        self._set_array("fixed", np.bool_, (n_nodes, 2), default=False)
+        shape = as_array(f"{self.name}: nodes", self.nodes).shape
+        dim = shape[1] if len(shape) == 2 and shape[1] in (PLANE, SPACE) else PLANE
+        self._set_array("nodes", np.float64, (-1, dim))
+        n_nodes = len(self.nodes)
+        for name, kinds in (("cells", (3, 4) if dim == PLANE else (4, 8)), ("contact", _CONTACT[dim])):
+            shape = as_array(f"{self.name}: {name}", getattr(self, name)).shape
+            self._set_array(name, np.int64, (-1, shape[1] if len(shape) == 2 and shape[1] in kinds else kinds[-1]), 0)
+        self._set_array("fixed", np.bool_, (n_nodes, dim), default=False)
         for name in ("imposed", "load"):
-            self._set_array(name, np.float64, (n_nodes, 2), default=0.0)
-        for name in ("axis", "start"):
-            self._set_array(name, np.float64, (2,))
-        if abs(np.hypot(*self.axis) - 1) > 1e-12:
-            self._refuse("axis", f"({self.axis[0]}, {self.axis[1]})", "a unit vector")
-        frame = [[self.axis[0], -self.axis[1]], [self.axis[1], self.axis[0]]]
-        object.__setattr__(self, "frame", freeze(frame, np.float64))
+            self._set_array(name, np.float64, (n_nodes, dim), default=0.0)
+        self._set_array("start", np.float64, (dim,), default=0.0)
+        if as_array(f"{self.name}: axis", self.axis).size == 0:
+            object.__setattr__(self, "axis", np.array([1.0, 0.0]) if dim == PLANE else np.eye(3)[:2])
+        self._set_array("axis", np.float64, (2,) if dim == PLANE else (2, 3))
+        if not np.allclose(self.axis @ self.axis.T, 1.0 if dim == PLANE else np.eye(2), rtol=0, atol=1e-12):
+            needed = "a unit vector" if dim == PLANE else "two unit vectors, normal to each other"
+            self._refuse("axis", f"({', '.join(map(str, self.axis.reshape(-1).tolist()))})", needed)
+        across = [-self.axis[1], self.axis[0]] if dim == PLANE else np.cross(*self.axis)
+        object.__setattr__(self, "frame", freeze(np.vstack([self.axis, across]).T, np.float64))
         if fault := _find_wrong_number(n_nodes, self.cells, self.contact):
             self._refuse(*fault)
         check = _check_small_mesh if self.cells.size <= _SMALL else _check_mesh
-        contact_nodes, fault = check(n_nodes, self.cells.shape, self.cells.tobytes(), self.contact.tobytes())
+        shapes = self.cells.shape, self.contact.shape
+        contact_nodes, fault = check(n_nodes, shapes, self.cells.tobytes(), self.contact.tobytes())
         object.__setattr__(self, "contact_nodes", contact_nodes)
         if (self.imposed[~self.fixed] != 0).any():
             self._refuse("imposed", "a displacement of a free component", "0 where nothing is fixed")
@@ -106,15 +117,27 @@ class Body:
             object.__setattr__(self, name, float(number))
         if self.rigid and not self.fixed.all():
             self._refuse("fixed", "a free node of a rigid body", "every component of every node fixed")
-        corners = self.nodes[self.cells]  # (n_cells, n_corners, 2)
-        to_next = np.roll(corners, -1, axis=1) - corners
-        after = np.roll(to_next, -1, axis=1)
-        turn = to_next[..., 0] * after[..., 1] - to_next[..., 1] * after[..., 0]
-        if not (turn > 0).all():
-            bad = np.flatnonzero((turn <= 0).any(axis=1))
-            self._refuse("cells", f"cell {bad[0]}, which is clockwise, folded or flat", "convex, counter-clockwise")
+        if len(bad := np.flatnonzero((self._turns <= 0).any(axis=1))):
+            found, needed = ("clockwise", "convex, counter-clockwise") if dim == PLANE else ("inside out", "convex")
+            self._refuse("cells", f"cell {bad[0]}, which is {found}, folded or flat", needed)
         if fault:
             self._refuse(*fault)
+
+    @property
+    def dim(self) -> int:
+        """The number of coordinates of a node."""
+        return int(self.nodes.shape[1])
+
+    @property
+    def _turns(self) -> FloatArray:
+        """The area or volume (n_cells, n_corners) that the edges at each corner of each cell span, signed."""
+        corners = self.nodes[self.cells]
+        if self.dim == PLANE:
+            to_next = np.roll(corners, -1, axis=1) - corners
+            after = np.roll(to_next, -1, axis=1)
+            return np.asarray(to_next[..., 0] * after[..., 1] - to_next[..., 1] * after[..., 0])
+        first, second, third = (corners[:, list(ends)] - corners for ends in _EDGES[self.cells.shape[1]])
+        return np.asarray((np.cross(first, second) * third).sum(axis=-1))
 
     @property
     def rigid(self) -> bool:
@@ -149,18 +172,24 @@ def _find_wrong_number(n_nodes: int, cells: IntArray, contact: IntArray) -> _Fau
             outlier = numbers.min() if numbers.min() < 0 else numbers.max()
             return name, f"node number {outlier}", f"numbers from 0 to {n_nodes - 1}"
     if not len(contact):
-        return "contact", "no edges", "the edges that may touch something (of a mesh: a tag that has some)"
+        return (
+            "contact",
+            "no edges",
+            "the edges that may touch something, in space the faces (of a mesh: a tag that has some)",
+        )
     return None
 
 
 def _check_mesh(
-    n_nodes: int, shape: tuple[int, int], cell_bytes: bytes, contact_bytes: bytes
+    n_nodes: int, shapes: tuple[tuple[int, ...], tuple[int, ...]], cell_bytes: bytes, contact_bytes: bytes
 ) -> tuple[IntArray, _Fault | None]:
-    """Return the contact nodes, and what is wrong with cells, of that shape, and edges, both bytes of int64 arrays."""
-    cells = np.frombuffer(cell_bytes, np.int64).reshape(shape)
-    contact = np.frombuffer(contact_bytes, np.int64).reshape(-1, 2)
+    """Return the contact nodes, and what is wrong with cells and contact, arrays of these shapes, bytes of int64."""
+    cells, contact = (
+        np.frombuffer(data, np.int64).reshape(shape)
+        for data, shape in zip((cell_bytes, contact_bytes), shapes, strict=True)
+    )
     fault = _find_wrong_cell(n_nodes, cells, contact) if len(cells) else None
-    if fault is None and any(len(set(ends)) < len(ends) for ends in contact.T.tolist()):
+    if fault is None and contact.shape[1] == 2 and any(len(set(ends)) < len(ends) for ends in contact.T.tolist()):
         fault = "contact", "two edges that begin or end at one node", "each edge once, in chains"
     return freeze(np.unique(contact), np.int64), fault
 
@@ -169,22 +198,50 @@ _SMALL = 512  # Number of node numbers of a mesh that is remembered: random mesh
 _check_small_mesh = lru_cache(maxsize=1024)(_check_mesh)
 
 
+# {number of corners of a cell in space: its faces, counter-clockwise seen from outside}
+SIDES = {
+    4: ((0, 2, 1), (0, 1, 3), (1, 2, 3), (0, 3, 2)),
+    8: ((0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7)),
+}
+# {the same: the other ends of three edges at each corner, in a right-handed order}
+_EDGES = {
+    4: ((1, 2, 0, 0), (2, 0, 1, 2), (3, 3, 3, 1)),
+    8: ((1, 2, 3, 0, 7, 4, 5, 6), (3, 0, 1, 2, 5, 6, 7, 4), (4, 5, 6, 7, 0, 1, 2, 3)),
+}
+_CONTACT = {PLANE: (2,), SPACE: (3, 4)}
+
+
 def _find_wrong_cell(n_nodes: int, cells: IntArray, contact: IntArray) -> _Fault | None:
     unused = np.setdiff1d(np.arange(n_nodes), cells)
     if len(unused):
         return "nodes", f"node {unused[0]} in no cell", "every node in a cell"
-    following = np.roll(cells, -1, axis=1)
-    edges = cells * n_nodes + following  # Each edge as one number, the cell on its left.
-    ordered = np.sort(edges, axis=None)
+    word, verb, plane = "edge", "on its left", contact.shape[1] == 2
+    if plane:
+        sides = np.stack([cells, np.roll(cells, -1, axis=1)], axis=-1).reshape(-1, 2)  # The cell is on the left.
+    else:
+        sides = np.concatenate([cells[:, side] for side in SIDES[cells.shape[1]]])
+        word, verb = "face", "behind it"
+    keys = _number_sides(sides, n_nodes)
+    ordered = np.sort(keys)
     if (ordered[1:] == ordered[:-1]).any():
-        return "cells", "two cells on the same side of an edge", "cells that do not overlap"
-    outer = edges[~np.isin(edges, following * n_nodes + cells)]
-    wrong = np.flatnonzero(~np.isin(contact[:, 0] * n_nodes + contact[:, 1], outer))
+        return "cells", f"two cells on the same side of {'an edge' if plane else 'a face'}", "cells that do not overlap"
+    outer = keys[~np.isin(keys, _number_sides(sides[:, ::-1], n_nodes))]
+    fits = contact.shape[1] == sides.shape[1]
+    wrong = np.flatnonzero(~np.isin(_number_sides(contact, n_nodes), outer)) if fits else np.arange(len(contact))
     if not len(wrong):
         return None
-    first, second = contact[wrong[0]]
-    return (
-        "contact",
-        f"the edge from node {first} to node {second}",
-        "edges of the boundary, each with the body on its left",
-    )
+    nodes = " to node ".join(map(str, contact[wrong[0]]))
+    return "contact", f"the {word} from node {nodes}", f"{word}s of the boundary, each with the body {verb}"
+
+
+def _number_sides(sides: IntArray, n_nodes: int) -> IntArray:
+    """Return a number (n,) for each side (n, n_corners): the same wherever a face begins, another one in reverse."""
+    n, n_corners = sides.shape
+    if n_corners > 2:
+        first = sides.argmin(axis=1)[:, None]
+        sides = np.take_along_axis(sides, (first + np.arange(n_corners)) % n_corners, axis=1)
+        sides = sides[:, [0, 1, -1]]  # Three corners of a face tell it from every other face.
+    numbers = np.zeros(n, np.int64)
+    for column in sides.T:
+        numbers = numbers * n_nodes + column
+    return numbers

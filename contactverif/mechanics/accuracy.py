@@ -1,7 +1,7 @@
 """A solved scene, and its errors where the exact solution is known, measured in one way for all formulations.
 
-An exact field is a function of places (n, 2), in the reference or in the current configuration, whichever the positions
-are that come with it. A field that is not smooth inside a segment needs more `parts`.
+An exact field is a function of places (n, dim), in the reference or in the current configuration, whichever the
+positions are that come with it. A field that is not smooth inside a segment needs more `parts`.
 """
 
 from collections.abc import Callable, Sequence
@@ -17,12 +17,12 @@ from contactverif.contract.case import Case
 from contactverif.contract.engine import EngineAnswer
 from contactverif.contract.errors import MisuseError, one_line
 from contactverif.contract.formulation import ContactPoints
-from contactverif.contract.interface import Interface, Surface
+from contactverif.contract.interface import SEGMENT, TRIANGLE, Interface, Surface
 from contactverif.contract.subject import CheckedFormulation, EngineSubject, Subject
 from contactverif.mechanics.newton import End, Trace, solve
 from contactverif.mechanics.scene import Scene
 
-Field = Callable[[FloatArray], FloatArray]  # Places (n, 2) to vectors (n, 2), or to numbers (n,).
+Field = Callable[[FloatArray], FloatArray]  # Places (n, dim) to vectors (n, dim), or to numbers (n,).
 
 # A pressure may end inside a segment with a vertical tangent: so many parts leave 1e-3 of its error.
 _PARTS_OF_EDGE = 32
@@ -36,7 +36,7 @@ class Solution:
 
     scene: Scene  # It has the distributed penalty ε̂ that it was solved with.
     state: Case  # The positions, multipliers behind them.
-    forces: FloatArray  # (n_nodes, 2), by which contact pushes the nodes
+    forces: FloatArray  # (n_nodes, dim), by which contact pushes the nodes
     points: ContactPoints | None = None  # None if none are reported
     nodal: bool = False  # Pressures of points are nodal forces (trait `penalty="nodal"`).
     trace: Trace | None = None  # Newton's method, iterate by iterate; None if another code solved the scene.
@@ -44,7 +44,7 @@ class Solution:
 
     @classmethod
     def from_displacements(cls, scene: Scene, displacements: FloatArray, no_solution: str = "") -> Self:
-        """Return the solution of another code from its displacements (n_nodes, 2) of the interface's nodes.
+        """Return the solution of another code from its displacements (n_nodes, dim) of the interface's nodes.
 
         The forces are those that the bodies need for these displacements, supports included.
         """
@@ -59,7 +59,7 @@ class Solution:
 
     @property
     def displacements(self) -> FloatArray:
-        """The displacements (n_nodes, 2) of the interface's nodes."""
+        """The displacements (n_nodes, dim) of the interface's nodes."""
         return self.state.positions - self.interface.nodes
 
     @property
@@ -83,29 +83,34 @@ class Solution:
 
 
 def shape_integrals(surface: Surface, positions: FloatArray) -> FloatArray:
-    """Return m_i = ∫N_i ds (n_nodes,), half the length of each segment at either end; 0 at other nodes."""
-    halves = np.repeat(surface.lengths(positions) / 2, 2)
-    return np.bincount(surface.segments.reshape(-1), weights=halves, minlength=len(positions)).astype(np.float64)
+    """Return m_i = ∫N_i ds (n_nodes,): half of each segment at either end, parts of faces; 0 at other nodes."""
+    if surface.faces.shape[1] == SEGMENT:
+        shares = np.repeat(surface.lengths(positions) / 2, 2)
+    else:
+        shapes, _, weights = _quadrature(surface, positions, 1)
+        shares = (weights @ shapes).reshape(-1)
+    return np.bincount(surface.faces.reshape(-1), weights=shares, minlength=len(positions)).astype(np.float64)
 
 
 def traction_forces(surface: Surface, positions: FloatArray, traction: Field, parts: int = 1) -> FloatArray:
-    """Return the nodal forces ∫N_i t ds (n_nodes, 2) of a traction t on a surface, by Gauss points; 0 at other nodes.
+    """Return the nodal forces ∫N_i t ds (n_nodes, dim) of a traction t on a surface, by Gauss points; 0 at other nodes.
 
-    The traction, force per length, acts on the body of this surface. Each segment is divided into equal parts.
+    The traction, force per length or area, acts on the body of this surface. Each segment or side of a face is divided
+    into equal parts.
     """
-    share, places, weights = _quadrature(surface, positions, parts)
-    loads = traction(places.reshape(-1, 2)).reshape(places.shape) * weights[..., None]  # (n_segments, n_points, 2)
-    forces = np.zeros((len(positions), 2))
-    for end, shape in ((0, 1 - share), (1, share)):
-        np.add.at(forces, surface.segments[:, end], np.einsum("p,spd->sd", shape, loads))
+    shapes, places, weights = _quadrature(surface, positions, parts)
+    loads = traction(places.reshape(-1, places.shape[-1])).reshape(places.shape) * weights[..., None]
+    forces = np.zeros(positions.shape)
+    for corners, shape in zip(surface.faces.T, shapes.T, strict=True):
+        np.add.at(forces, corners, np.einsum("p,spd->sd", shape, loads))
     return forces
 
 
 def force_error(forces: FloatArray, exact: FloatArray, integrals: FloatArray) -> float:
-    """Return E_F = sqrt(Σ|F_i − F_i^exact|²/m_i) / sqrt(Σ|F_i^exact|²/m_i) of nodal forces (n_nodes, 2), dimensionless.
+    """Return E_F = sqrt(Σ|F_i − F_i^exact|²/m_i) / sqrt(Σ|F_i^exact|²/m_i), dimensionless.
 
-    The integrals are m_i = ∫N_i ds (n_nodes,). Nodes where it is 0 do not count, so that those of one surface select
-    it.
+    Forces are nodal (n_nodes, dim). The integrals are m_i = ∫N_i ds (n_nodes,). Nodes where it is 0 do not count, so
+    that those of one surface select it.
     """
     counted = integrals > 0
     weights = 1 / integrals[counted, None]
@@ -130,7 +135,9 @@ def pressure_error(solution: Solution, exact: Field, scale: float) -> float | No
     if solution.nodal:
         surface, positions, n = solution.interface.slave, solution.state.positions, solution.interface.n_slave_nodes
         named = points.slave_segment >= 0
-        nodes = surface.segments[points.slave_segment[named], (points.c[named] > 0).astype(np.int64)]
+        shape = points.slave_shape
+        corner = shape.argmax(axis=1) if shape.size else points.c > 0
+        nodes = surface.faces[points.slave_segment[named], corner[named].astype(np.int64)]
         places, weights = positions[:n], shape_integrals(surface, positions)[:n]
         pressures = np.bincount(nodes, weights=pressures[named], minlength=n) / weights
     counted = weights > 0
@@ -143,20 +150,19 @@ def pressure_error(solution: Solution, exact: Field, scale: float) -> float | No
 def best_pressure_error(surface: Surface, positions: FloatArray, exact: Field, scale: float) -> float:
     """Return the root mean square error of the best pressure on a mesh, over a pressure `scale`.
 
-    The best one is continuous, linear between the nodes of a surface at positions (n_nodes, 2), and nearest to the
+    The best one is continuous, linear between the nodes of a surface at positions (n_nodes, dim), and nearest to the
     exact pressure in L2.
     """
-    share, places, weights = _quadrature(surface, positions, _PARTS_OF_EDGE)
-    values = exact(places.reshape(-1, 2)).reshape(weights.shape)
-    shapes = np.stack([1 - share, share])  # (2, n_points)
-    nodes, ends = np.unique(surface.segments, return_inverse=True)
-    ends = ends.reshape(-1, 2)
-    right = np.bincount(ends.ravel(), np.einsum("ep,sp->se", shapes, values * weights).ravel(), len(nodes))
-    entries = np.einsum("ep,fp,sp->sef", shapes, shapes, weights).ravel()
-    rows, columns = np.repeat(ends, 2, axis=1).ravel(), np.tile(ends, (1, 2)).ravel()
+    shapes, places, weights = _quadrature(surface, positions, _PARTS_OF_EDGE)
+    values = exact(places.reshape(-1, places.shape[-1])).reshape(weights.shape)
+    nodes, corners = np.unique(surface.faces, return_inverse=True)
+    corners, n = corners.reshape(surface.faces.shape), surface.faces.shape[1]
+    right = np.bincount(corners.ravel(), np.einsum("pe,sp->se", shapes, values * weights).ravel(), len(nodes))
+    entries = np.einsum("pe,pf,sp->sef", shapes, shapes, weights).ravel()
+    rows, columns = np.repeat(corners, n, axis=1).ravel(), np.tile(corners, (1, n)).ravel()
     mass = sparse.csc_array((entries, (rows, columns)), shape=(len(nodes), len(nodes)))
     best = linalg.spsolve(mass, right)
-    return float(np.sqrt(np.average((best[ends] @ shapes - values) ** 2, weights=weights))) / scale
+    return float(np.sqrt(np.average((best[corners] @ shapes.T - values) ** 2, weights=weights))) / scale
 
 
 def displacement_error(
@@ -164,13 +170,12 @@ def displacement_error(
 ) -> float:
     """Return sqrt(∫|u_h − u^exact|² ds) / sqrt(∫|u^exact|² ds) of the displacements of a surface.
 
-    Positions (n_nodes, 2) and the places of the exact field are those of the reference. Displacements (n_nodes, 2) are
-    interpolated linearly. Each segment is divided into equal parts.
+    Positions (n_nodes, dim) and the places of the exact field are those of the reference. Displacements (n_nodes, dim)
+    are interpolated by the shape functions. Each segment or side of a face is divided into equal parts.
     """
-    share, places, weights = _quadrature(surface, positions, parts)
-    ends = displacements[surface.segments]  # (n_segments, 2, 2)
-    interpolated = (1 - share)[:, None] * ends[:, None, 0] + share[:, None] * ends[:, None, 1]
-    expected = exact(places.reshape(-1, 2)).reshape(places.shape)
+    shapes, places, weights = _quadrature(surface, positions, parts)
+    interpolated = np.einsum("pk,fkd->fpd", shapes, displacements[surface.faces])
+    expected = exact(places.reshape(-1, places.shape[-1])).reshape(places.shape)
     squares = [((weights[..., None] * field**2).sum()) for field in (interpolated - expected, expected)]
     return float(np.sqrt(squares[0] / squares[1]))
 
@@ -190,11 +195,21 @@ def fit_rate(sizes: Sequence[float] | FloatArray, errors: Sequence[float] | Floa
 
 
 def _quadrature(surface: Surface, positions: FloatArray, parts: int) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return shares of a segment (n_points,), places (n_segments, n_points, 2) and weights (n_segments, n_points)."""
+    """Return shapes (n_points, n_corners), places (n_faces, n_points, dim) and weights (n_faces, n_points)."""
     share = ((np.arange(parts)[:, None] + (_ABSCISSAS + 1) / 2) / parts).reshape(-1)
-    first, second = positions[surface.segments[:, 0]], positions[surface.segments[:, 1]]
-    places = first[:, None] + share[:, None] * (second - first)[:, None]
-    return share, places, surface.lengths(positions)[:, None] * np.tile(_GAUSS_WEIGHTS / (2 * parts), parts)
+    weight = np.tile(_GAUSS_WEIGHTS / (2 * parts), parts)
+    corners, n_corners = positions[surface.faces], surface.faces.shape[1]
+    if n_corners == SEGMENT:
+        shapes, weights = np.stack([1 - share, share], axis=1), surface.lengths(positions)[:, None] * weight
+    else:  # A triangle is a quadrilateral whose last two corners are one: its Jacobian is linear.
+        s, t = (part.reshape(-1) for part in np.meshgrid(share, share, indexing="ij"))
+        shapes = np.stack([(1 - s) * (1 - t), s * (1 - t), s * t, (1 - s) * t], axis=1)
+        slopes = np.array([[t - 1, 1 - t, t, -t], [s - 1, -s, s, 1 - s]]).swapaxes(1, 2)  # (2, n_points, 4)
+        if n_corners == TRIANGLE:
+            shapes, slopes = (np.add.reduceat(each, [0, 1, 2], axis=-1) for each in (shapes, slopes))
+        tangents = slopes[:, None] @ (corners - corners[:, :1])  # (2, n_faces, n_points, 3)
+        weights = np.linalg.norm(np.cross(*tangents), axis=-1) * np.outer(weight, weight).reshape(-1)
+    return shapes, corners[:, :1] + shapes[:, 1:] @ (corners[:, 1:] - corners[:, :1]), weights
 
 
 # Forces out of balance by this share of the largest one are a solution: errors of meshes are many times as large.
@@ -206,8 +221,9 @@ def solve_for_accuracy(
 ) -> Solution:
     """Solve a scene at its own penalty, with the formulation's tangent, or with differences where that does not help.
 
-    A nodal formulation gets ε̂ × the mean slave segment. The start (n_free,) is the first guess of the scene by
-    default. The step of differences is a length that is small against the penetration. An engine solves it by itself.
+    A nodal formulation gets ε̂ × the slave's share of a node (`Case.penalty`). The start (n_free,) is the first guess of
+    the scene by default. The step of differences is a length that is small against the penetration. An engine solves it
+    by itself.
     """
     if isinstance(subject, EngineSubject):
         return solve_by_engine(scene, subject)[0]
@@ -244,7 +260,7 @@ def solution_of(trace: Trace, formulation: CheckedFormulation, *, nodal: bool) -
     scene, interface, z = trace.scene, trace.scene.interface, trace.z
     state = Case(interface, z, scene.penalty, name=scene.name, n_multipliers=len(trace.multipliers))
     pairing = formulation.pair(interface, z)
-    forces = -formulation.residual(interface, pairing, z)[: interface.n_unknowns].reshape(-1, 2)
+    forces = -formulation.residual(interface, pairing, z)[: interface.n_unknowns].reshape(interface.nodes.shape)
     points = formulation.contact_points(interface, pairing, z) if "contact_points" in formulation.provides else None
     return Solution(scene, state, forces, points, nodal, trace)
 

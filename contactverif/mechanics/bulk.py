@@ -6,7 +6,7 @@ over all cells, because a loop over pairs of shape functions takes longer than a
 Rule for the next editor: the stiffness knows nothing of any contact formulation, since its nodal forces judge them all.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cache, lru_cache
 from typing import Any
@@ -21,6 +21,7 @@ from skfem.quadrature import get_quadrature
 from contactverif.contract.arrays import FloatArray, IntArray, dense
 from contactverif.contract.body import Body
 from contactverif.contract.errors import MisuseError
+from contactverif.contract.interface import PLANE, SPACE, unit_normals
 
 CACHE_SIZE = 512  # Number of condensed bodies that are remembered: penalties and formulations of one run share them.
 SHARED_SIZE = 64  # Number of factorised meshes that are remembered: loads, places and penalties share them.
@@ -33,8 +34,12 @@ _RESISTANCE_FLOOR = 1e-9  # A rigid motion of the body's size that meets less re
 _SAFE_RESISTANCE = 1e-6
 # The matrix is symmetric and positive definite, so pivots lie on the diagonal and an ordering of A + Aᵀ fills less.
 _SYMMETRIC = {"permc_spec": "MMD_AT_PLUS_A", "diag_pivot_thresh": 0.0, "options": {"SymmetricMode": True}}
+_AXES = "first", "second", "third"
 _MOTION_FLOOR = 1e-6  # A smaller part of a free motion is not mentioned.
-_MOTIONS = ("move along its first axis", "move along its second axis", "turn")
+_MOTIONS = {
+    PLANE: ("move along its first axis", "move along its second axis", "turn"),
+    SPACE: tuple(f"{verb} {axis} axis" for verb in ("move along its", "turn about its") for axis in _AXES),
+}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -43,17 +48,17 @@ class _Matrices:
 
     unknowns: IntArray  # (n,) The free components on the contact boundary.
     interior: IntArray  # All others that are free.
-    whole: Any  # (2 n_nodes, 2 n_nodes) The stiffness matrix.
+    whole: Any  # (dim × n_nodes, dim × n_nodes) The stiffness matrix.
     across: Any  # (n_interior, n) The part of it that couples the interior with the unknowns.
     # Returns the displacements of the interior under forces (n_interior,) or (n_interior, n_right).
     solve: Callable[[FloatArray], FloatArray]
     influence: Callable[[FloatArray], FloatArray]  # From the unknowns (n,) to their effect on the interior.
     condensed: FloatArray  # (n, n) The condensed stiffness, symmetric.
-    gradients: FloatArray  # (n_cells, n_points, n_corners, 2): those of the shape functions, in the body's axes.
+    gradients: FloatArray  # (n_cells, n_points, n_corners, dim): those of the shape functions, in the body's axes.
 
 
 _NONE, _EMPTY = np.zeros(0, np.int64), np.zeros((0, 0))
-_RIGID = _Matrices(_NONE, _NONE, _EMPTY, _EMPTY, _EMPTY.dot, _EMPTY.dot, _EMPTY, np.zeros((0, 1, 4, 2)))
+_NOTHING = _NONE, _NONE, _EMPTY, _EMPTY, _EMPTY.dot, _EMPTY.dot, _EMPTY  # That is known of a rigid body.
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -62,12 +67,12 @@ class CondensedBody:
 
     body: Body
     load: FloatArray  # (n,) The condensed load g, a force, of nodal forces and of imposed displacements.
-    _particular: FloatArray  # (2 n_nodes,): the displacements if all unknowns are 0.
+    _particular: FloatArray  # (dim × n_nodes,): the displacements if all unknowns are 0.
     _matrices: _Matrices
 
     @property
     def unknowns(self) -> IntArray:
-        """The free components (n,) on the contact boundary: 2 × node + component, in the body's axes."""
+        """The free components (n,) on the contact boundary: dim × node + component, in the body's axes."""
         return self._matrices.unknowns
 
     @property
@@ -76,55 +81,69 @@ class CondensedBody:
         return self._matrices.condensed
 
     def displacements(self, q: FloatArray, factor: float = 1.0) -> FloatArray:
-        """Return the displacements (n_nodes, 2) of all nodes, a length each, in global axes.
+        """Return the displacements (n_nodes, dim) of all nodes, a length each, in global axes.
 
         `q` (n,) are the unknowns, and `factor` is the share of loads and imposed displacements.
         """
         u = factor * self._particular
         u[self._matrices.interior] += self._matrices.influence(q)
         u[self.unknowns] = q
-        return u.reshape(-1, 2) @ self.body.frame.T
+        return u.reshape(self.body.nodes.shape) @ self.body.frame.T
 
     def stresses(self, q: FloatArray, factor: float = 1.0) -> FloatArray:
-        """Return the stresses (n_cells, n_points, 3) at the Gauss points, in the body's axes.
+        """Return the stresses (n_cells, n_points, 3 or 6) at the Gauss points, in the body's axes.
 
-        They are along its first axis, across and shear, a force per length squared, positive in tension. The arguments
-        are those of `displacements`.
+        They are a force per length squared, positive in tension: along its axes, then shear, in the plane one, in space
+        across the first, the second and the third axis. The arguments are those of `displacements`.
         """
-        u = (self.displacements(q, factor) @ self.body.frame)[self.body.cells]  # (n_cells, n_corners, 2)
+        u = (self.displacements(q, factor) @ self.body.frame)[self.body.cells]  # (n_cells, n_corners, dim)
         gradient = np.einsum("eqad,eac->eqcd", self._matrices.gradients, u)
-        shear = gradient[..., 0, 1] + gradient[..., 1, 0]
-        return np.stack([gradient[..., 0, 0], gradient[..., 1, 1], shear], axis=-1) @ elasticity(self.body).T
+        normal = np.moveaxis(np.diagonal(gradient, axis1=-2, axis2=-1), -1, 0)
+        shear = [gradient[..., i, j] + gradient[..., j, i] for i, j in _SHEARS[self.body.dim]]
+        return np.stack([*normal, *shear], axis=-1) @ elasticity(self.body).T
+
+
+# {dim: the axes between which each angle of shear is}
+_SHEARS = {PLANE: ((0, 1),), SPACE: ((1, 2), (0, 2), (0, 1))}
 
 
 def elasticity(body: Body) -> FloatArray:
-    """Return the matrix (3, 3) from strains (along, across, shear angle) to stresses in plane strain."""
+    """Return the matrix from strains (along the axes, shear angles) to stresses: (3, 3) in plane strain, (6, 6)."""
     lame = body.young * body.poisson / ((1 + body.poisson) * (1 - 2 * body.poisson))
     shear = body.young / (2 * (1 + body.poisson))
-    return np.array([[lame + 2 * shear, lame, 0], [lame, lame + 2 * shear, 0], [0, 0, shear]])
+    dim = body.dim
+    matrix = shear * np.diag([*[2.0] * dim, *[1.0] * len(_SHEARS[dim])])
+    matrix[:dim, :dim] += lame
+    return matrix
 
 
 def assemble_stiffness(body: Body) -> tuple[Any, FloatArray]:
-    """Return K (2 n_nodes, 2 n_nodes) and the shape functions' gradients, both in the body's axes.
+    """Return K (dim × n_nodes, dim × n_nodes) and the shape functions' gradients, both in the body's axes.
 
-    K is dense up to `DENSE_LIMIT` unknowns, else sparse. Gradients are (n_cells, n_points, n_corners, 2).
+    K is dense up to `DENSE_LIMIT` unknowns, else sparse. Gradients are (n_cells, n_points, n_corners, dim).
     """
-    reference, weights = _reference_cell(body.cells.shape[1])  # (n_points, n_corners, 2), (n_points,)
+    dim = body.dim
+    reference, weights = _reference_cell(body.cells.shape[1], dim)  # (n_points, n_corners, dim), (n_points,)
     # Differences of nodes first: a cell far from the origin has the same stiffness to the last bit.
-    corners = (body.nodes[body.cells] - body.nodes[body.cells[:, :1]]) @ body.frame  # (n_cells, n_corners, 2)
+    corners = (body.nodes[body.cells] - body.nodes[body.cells[:, :1]]) @ body.frame  # (n_cells, n_corners, dim)
     jacobians = np.einsum("pad,eac->epcd", reference, corners)  # ∂x_c/∂X_d
-    (a, b), (c, d) = jacobians.transpose(2, 3, 0, 1)  # Written out, so that another unit of length changes no bit.
-    areas = (a * d - b * c) * weights
+    columns = np.moveaxis(jacobians, -1, 0)
+    if dim == PLANE:  # Written out, so that another unit of length changes no bit.
+        areas = (columns[0][..., 0] * columns[1][..., 1] - columns[1][..., 0] * columns[0][..., 1]) * weights
+    else:
+        areas = (np.cross(columns[0], columns[1]) * columns[2]).sum(axis=-1) * weights
     gradients = np.matmul(reference, np.linalg.inv(jacobians))
     n_cells, n_points, n_corners, _ = gradients.shape
-    unit = np.zeros((n_cells, n_points, 3, n_corners, 2))  # Strains of unit displacements.
-    unit[:, :, 0, :, 0] = unit[:, :, 2, :, 1] = gradients[..., 0]
-    unit[:, :, 1, :, 1] = unit[:, :, 2, :, 0] = gradients[..., 1]
-    strains = unit.reshape(n_cells, n_points, 3, 2 * n_corners)
+    unit = np.zeros((n_cells, n_points, dim + len(_SHEARS[dim]), n_corners, dim))  # Strains of unit displacements.
+    for axis in range(dim):
+        unit[:, :, axis, :, axis] = gradients[..., axis]
+    for row, (i, j) in enumerate(_SHEARS[dim], dim):
+        unit[:, :, row, :, j], unit[:, :, row, :, i] = gradients[..., i], gradients[..., j]
+    strains = unit.reshape(n_cells, n_points, -1, dim * n_corners)
     blocks = np.matmul(strains.swapaxes(2, 3), elasticity(body) @ strains * areas[..., None, None]).sum(axis=1)
-    unknowns = (2 * body.cells[:, :, None] + np.arange(2)).reshape(n_cells, -1)
+    unknowns = (dim * body.cells[:, :, None] + np.arange(dim)).reshape(n_cells, -1)
     rows, columns = unknowns[:, :, None], unknowns[:, None, :]
-    size = 2 * len(body.nodes)
+    size = body.nodes.size
     if size <= DENSE_LIMIT:
         places = (rows * size + columns).ravel()
         return np.bincount(places, weights=blocks.ravel(), minlength=size * size).reshape(size, size), gradients
@@ -133,18 +152,27 @@ def assemble_stiffness(body: Body) -> tuple[Any, FloatArray]:
 
 
 @cache
-def _reference_cell(corners: int) -> tuple[FloatArray, FloatArray]:
+def _reference_cell(corners: int, dim: int) -> tuple[FloatArray, FloatArray]:
     """Return gradients of the shape functions on scikit-fem's reference cell at its Gauss points, and weights."""
-    element, order = (skfem.ElementTriP1(), 1) if corners == 3 else (skfem.ElementQuad1(), 2)
+    element, order, numbers = _ELEMENTS[dim, corners]
     points, weights = get_quadrature(element.refdom, order)
-    gradients = np.stack([element.lbasis(points, corner)[1] for corner in range(corners)])  # (n_corners, 2, n_points)
+    gradients = np.stack([element.lbasis(points, corner)[1] for corner in numbers])  # (n_corners, dim, n_points)
     return np.ascontiguousarray(gradients.transpose(2, 0, 1)), weights
 
 
+# {(dim, corners): the element, the degree that its quadrature is exact for, and its number of each corner of a cell}
+_ELEMENTS: dict[tuple[int, int], tuple[Any, int, Sequence[int]]] = {
+    (PLANE, 3): (skfem.ElementTriP1(), 1, range(3)),
+    (PLANE, 4): (skfem.ElementQuad1(), 2, range(4)),
+    (SPACE, 4): (skfem.ElementTetP1(), 1, range(4)),
+    (SPACE, 8): (skfem.ElementHex1(), 2, (7, 4, 1, 5, 6, 2, 0, 3)),
+}
+
+
 def free_on_contact(body: Body) -> IntArray:
-    """Return the free components (n,) on the contact boundary: 2 × node + component, in the body's axes, ascending."""
+    """Return the free components (n,) on the contact boundary: dim × node + component, in its axes, ascending."""
     nodes = body.contact_nodes
-    components: IntArray = 2 * nodes[:, None] + np.arange(2)
+    components: IntArray = body.dim * nodes[:, None] + np.arange(body.dim)
     return components[~body.fixed[nodes]]
 
 
@@ -157,7 +185,8 @@ def condense(body: Body) -> CondensedBody:
     """
     imposed = body.imposed.reshape(-1)
     if body.rigid:
-        return CondensedBody(body, np.zeros(0), imposed, _RIGID)
+        gradients = np.zeros((0, 1, body.cells.shape[1], body.dim))
+        return CondensedBody(body, np.zeros(0), imposed, _Matrices(*_NOTHING, gradients))
     corners = body.nodes[body.cells] - body.nodes[body.cells[:, :1]]
     arrays = (corners, body.cells, body.fixed, body.contact_nodes, body.axis)
     key = (body.cells.shape, body.young, body.poisson, *(array.tobytes() for array in arrays))
@@ -252,26 +281,26 @@ def _interior_solver(body: Body, matrix: Any) -> tuple[Callable[[FloatArray], Fl
 def loose_modes(body: Body) -> list[str]:
     """Return the rigid motions of a body that neither its supports nor frictionless contact resist, in words.
 
-    Contact resists a motion only if the motion has a component along the normal of a contact edge.
+    Contact resists a motion only if the motion has a component along the normal of a contact edge or face.
     """
-    nodes = body.nodes @ body.frame
+    nodes, dim = body.nodes @ body.frame, body.dim
     centre, size = nodes.mean(axis=0), np.ptp(nodes, axis=0).max()
-    offset = (nodes - centre) / size
-    modes = np.zeros((*nodes.shape, 3))
-    modes[:, 0, 0] = modes[:, 1, 1] = 1
-    modes[:, 0, 2], modes[:, 1, 2] = -offset[:, 1], offset[:, 0]
-    first, second = body.contact.T
-    x, y = (nodes[second] - nodes[first]).T
-    pressed = (modes[body.contact, 0] * y[:, None, None] - modes[body.contact, 1] * x[:, None, None]).reshape(-1, 3)
-    pressed /= np.repeat(np.hypot(x, y), 2)[:, None]
+    offset, units = (nodes - centre) / size, np.broadcast_to(np.eye(dim), (len(nodes), dim, dim))
+    if dim == PLANE:
+        turns = np.column_stack([-offset[:, 1], offset[:, 0]])[:, :, None]
+    else:
+        turns = np.cross(units, offset[:, None, :]).swapaxes(1, 2)
+    modes = np.concatenate([units, turns], axis=2)  # (n_nodes, dim, n_modes)
+    normals = unit_normals(nodes[body.contact])
+    pressed = np.einsum("fkim,fi->fkm", modes[body.contact], normals).reshape(-1, modes.shape[2])
     resisted = np.concatenate([modes[body.fixed], pressed])
     sizes = np.linalg.eigvalsh(resisted.T @ resisted)
     if sizes[0] > _SAFE_RESISTANCE * max(sizes[-1], 1.0):
         return []
-    # The triangle of QR has the same singular values, and at most three rows however many supports there are.
+    # The triangle of QR has the same singular values, and no more rows than motions, however many supports there are.
     _, sizes, motions = np.linalg.svd(np.linalg.qr(resisted, mode="r"), full_matrices=True)
-    sizes = np.concatenate([sizes, np.zeros(3 - len(sizes))])
+    sizes = np.concatenate([sizes, np.zeros(len(motions) - len(sizes))])
     # Motions are numbers without dimension, of order 1: resistance below the floor is roundoff.
     free = motions[sizes <= _RESISTANCE_FLOOR * max(sizes.max(), 1.0)]
-    parts = zip(_MOTIONS, np.abs(free).T, strict=True)
+    parts = zip(_MOTIONS[dim], np.abs(free).T, strict=True)
     return [words for words, part in parts if part.max(initial=0.0) > _MOTION_FLOOR]

@@ -23,8 +23,8 @@ from contactverif.mechanics.scene import Scene
 def change_units(scene: Scene, length: float, modulus: float) -> Scene:
     """Return the scene with all lengths and all moduli multiplied.
 
-    A nodal force is multiplied by length × modulus, a pressure by the modulus, and the distributed stiffness ε̂ by
-    modulus / length. The facts of the scene are left out.
+    A nodal force is multiplied by length × modulus, in space by length² × modulus, a pressure by the modulus, and the
+    distributed stiffness ε̂ by modulus / length. The facts of the scene are left out.
 
     Examples
     --------
@@ -45,14 +45,15 @@ def change_units(scene: Scene, length: float, modulus: float) -> Scene:
             nodes=body.nodes * length,
             young=body.young * modulus,
             imposed=body.imposed * length,
-            load=body.load * (length * modulus),
+            load=body.load * (length ** (scene.dim - 1) * modulus),
             start=body.start * length,
         )
         for body in scene.bodies
     )
     changed = Scene(bodies, scene.slave, scene.master, scene.penalty * modulus / length, {}, scene.name)
     # What follows from the bodies is multiplied too, where `cached_property` keeps it, and not computed again.
-    factors = {"transformation": 1.0, "stiffness": modulus, "load": modulus * length}
+    stiffer = modulus * length ** (scene.dim - 2)
+    factors = {"transformation": 1.0, "stiffness": stiffer, "load": stiffer * length}
     for name, factor in (factors | dict.fromkeys(("imposed_displacements", "start"), length)).items():
         vars(changed)[name] = factor * getattr(scene, name)
     return changed
@@ -66,7 +67,7 @@ def snap(scene: Scene, spacing: float) -> Scene:
 
 
 def move(interface: Interface, way: float) -> Interface:
-    """Return an interface moved by `way`, a length, along both axes; its nodes keep all their digits."""
+    """Return an interface moved by `way`, a length, along all axes; its nodes keep all their digits."""
     moved = interface.at(interface.nodes + way)
     if (moved.nodes - way != interface.nodes).any():
         raise MisuseError("move", f"{way}, which rounds a node", "a way that rounds no node")

@@ -22,7 +22,7 @@ from contactverif.contract.body import Body
 from contactverif.contract.case import BODIES, Case
 from contactverif.contract.engine import EngineAnswer, SceneArrays
 from contactverif.contract.errors import MisuseError
-from contactverif.contract.interface import Interface, Surface, ways_to_master
+from contactverif.contract.interface import PLANE, Interface, Surface, ways_to_master
 from contactverif.mechanics.bulk import (
     CACHE_SIZE,
     DENSE_LIMIT,
@@ -39,14 +39,18 @@ _SAME = 64 * UNIT_ROUNDOFF  # Coordinates that differ by less, over the largest 
 
 
 def pack_bodies(bodies: Sequence[Body], slave: Sequence[int]) -> dict[str, FloatArray]:
-    """Return all bodies in a few arrays of floats, whose integers are exact; a triangle has −1 for its fourth node."""
+    """Return all bodies in a few arrays of floats, whose integers are exact; −1 stands for nodes that a cell lacks."""
     counts = [len(body.nodes) for body in bodies]
     first = np.cumsum([0, *counts[:-1]]).tolist()
-    corners = [body.cells + start for body, start in zip(bodies, first, strict=True)]
+
+    def number(name: str, width: int) -> list[IntArray]:
+        rows = [getattr(body, name) + start for body, start in zip(bodies, first, strict=True)]
+        return [np.pad(part, ((0, 0), (0, width - part.shape[1])), constant_values=-1) for part in rows]
+
     parts: dict[str, list[Any]] = {
         "nodes": [body.nodes for body in bodies],
-        "cells": [np.hstack([part, np.full((len(part), 4 - part.shape[1]), -1)]) for part in corners],
-        "contact": [body.contact + start for body, start in zip(bodies, first, strict=True)],
+        "cells": number("cells", 4 if bodies[0].dim == PLANE else 8),
+        "contact": number("contact", 2 if bodies[0].dim == PLANE else 4),
         **{name: [getattr(body, name) for body in bodies] for name in ("fixed", "imposed", "load")},
     }
     return {
@@ -63,14 +67,17 @@ def unpack_bodies(packed: Mapping[str, FloatArray]) -> tuple[tuple[Body, ...], t
     ends = np.cumsum(count).tolist()
     cells, contact = (packed[name].astype(np.int64) for name in ("cells", "contact"))
     bodies = []
+
+    def rows_of(numbers: IntArray, start: int, end: int) -> IntArray:
+        rows = numbers[(numbers[:, 0] >= start) & (numbers[:, 0] < end)]
+        return rows[:, (rows >= 0).any(axis=0)] - start if len(rows) else rows
+
     for index, (start, end) in enumerate(zip([0, *ends], ends, strict=False)):
-        corners = cells[(cells[:, 0] >= start) & (cells[:, 0] < end)] if len(cells) else cells.reshape(0, 4)
-        corners = corners[:, :3] if len(corners) and (corners[:, 3] < 0).all() else corners
         bodies.append(
             Body(
                 nodes=packed["nodes"][start:end],
-                cells=corners - start,
-                contact=contact[(contact[:, 0] >= start) & (contact[:, 0] < end)] - start,
+                cells=rows_of(cells, start, end),
+                contact=rows_of(contact, start, end),
                 young=float(packed["young"][index]),
                 poisson=float(packed["poisson"][index]),
                 fixed=packed["fixed"][start:end] != 0,
@@ -97,8 +104,8 @@ class Pose:
     """Bodies as they are posed to a code: their arrays, and how an answer goes back to them."""
 
     arrays: SceneArrays
-    turn: FloatArray  # (2, 2): from the axes of the arrays to those of the bodies.
-    lowered: FloatArray  # (n_nodes, 2): by how much nodes were moved beforehand, in the axes of the arrays.
+    turn: FloatArray  # (dim, dim): from the axes of the arrays to those of the bodies.
+    lowered: FloatArray  # (n_nodes, dim): by how much nodes were moved beforehand, in the axes of the arrays.
     scale: float  # The factor of all loads and imposed displacements.
 
     def restore(self, answer: EngineAnswer) -> EngineAnswer:
@@ -113,9 +120,9 @@ class Pose:
 
 
 def _turn_back(nodes: FloatArray, turn: FloatArray) -> FloatArray:
-    """Return places (n, 2) in the axes of a rotation; coordinates that rounding alone tells apart become equal."""
+    """Return places (n, dim) in the axes of a rotation; coordinates that rounding alone tells apart become equal."""
     upright = nodes @ turn
-    if (np.abs(turn) == np.eye(2)).all():
+    if (np.abs(turn) == np.eye(len(turn))).all():
         return upright
     rounding = _SAME * float(np.abs(upright).max())
     for column in upright.T:
@@ -179,11 +186,18 @@ class Scene:
             raise MisuseError("bodies", roles, "each body either slave or master, and at least one of both")
         if not self.slave or not self.master:
             raise MisuseError("bodies", "no slave" if not self.slave else "no master", "at least one of both")
+        if len({body.dim for body in self.bodies}) > 1:
+            raise MisuseError("bodies", "bodies in the plane and bodies in space", "either")
         for body in self.bodies:
             if loose := loose_modes(body):
                 needed = "fixed components that prevent it (contact without friction does not)"
                 actual = f"{'too few' if body.fixed.any() else 'none'}: it can {' and '.join(loose)}"
                 raise MisuseError(f"supports of {body.name}", actual, needed)
+
+    @property
+    def dim(self) -> int:
+        """The number of coordinates of a node."""
+        return self.bodies[0].dim
 
     @cached_property
     def bodies_in_reach(self) -> tuple[int, ...]:
@@ -237,7 +251,7 @@ class Scene:
 
     @cached_property
     def unknowns(self) -> tuple[IntArray, ...]:
-        """The unknowns of each body within reach: 2 × node + component of what is free on its contact boundary."""
+        """The unknowns of each body within reach: dim × node + component of what is free on its contact boundary."""
         return tuple(map(free_on_contact, self._reached))
 
     @cached_property
@@ -277,10 +291,10 @@ class Scene:
         rows, columns, values = [], [], []
         first = 0
         for body, unknowns, part in zip(self._reached, self.unknowns, self.slices, strict=True):
-            nodes, components = np.divmod(unknowns, 2)
+            nodes, components = np.divmod(unknowns, self.dim)
             on_contact = np.flatnonzero(np.isin(nodes, body.contact_nodes))
-            row = 2 * (first + np.searchsorted(body.contact_nodes, nodes[on_contact]))
-            for direction in (0, 1):
+            row = self.dim * (first + np.searchsorted(body.contact_nodes, nodes[on_contact]))
+            for direction in range(self.dim):
                 rows.append(row + direction)
                 columns.append(part.start + on_contact)
                 values.append(body.frame[direction, components[on_contact]])
@@ -302,7 +316,8 @@ class Scene:
     @cached_property
     def start(self) -> FloatArray:
         """The first guess (n_free,) of q."""
-        return np.concatenate([b.start[part % 2] for b, part in zip(self._reached, self.unknowns, strict=True)])
+        parts = zip(self._reached, self.unknowns, strict=True)
+        return np.concatenate([body.start[unknowns % self.dim] for body, unknowns in parts])
 
     def positions(self, q: FloatArray, factor: float = 1.0) -> FloatArray:
         """Return the current positions z (n_unknowns,) of the interface's nodes, a length each."""
@@ -314,24 +329,24 @@ class Scene:
         return self.stiffness @ q - factor * self.load
 
     def nodal_forces(self, q: FloatArray, factor: float = 1.0) -> FloatArray:
-        """Return the forces (n_nodes, 2) that contact must supply at the interface's nodes, in global axes.
+        """Return the forces (n_nodes, dim) that contact must supply at the interface's nodes, in global axes.
 
         Reactions of supports on the contact boundary are not among them.
         """
-        return (self.transformation @ self.bulk_forces(q, factor)).reshape(-1, 2)
+        return (self.transformation @ self.bulk_forces(q, factor)).reshape(-1, self.dim)
 
     def displacements(self, q: FloatArray, factor: float = 1.0) -> list[FloatArray]:
-        """Return the displacements (n_nodes, 2) of the nodes of each body, a length each, in global axes.
+        """Return the displacements (n_nodes, dim) of the nodes of each body, a length each, in global axes.
 
         A body out of reach is solved on its own.
         """
         return [body.displacements(part, factor) for body, part in self._all_unknowns(q, factor)]
 
     def stresses(self, q: FloatArray, factor: float = 1.0) -> list[FloatArray]:
-        """Return the stresses (n_cells, n_points, 3) of each body at its Gauss points, force per length squared.
+        """Return the stresses (n_cells, n_points, 3 or 6) of each body at its Gauss points, force per length squared.
 
-        They are the normal stresses along its first and second axis, positive in tension, and the shear stress. A rigid
-        body has no cells.
+        They are the normal stresses along its axes, positive in tension, and the shear stresses, see `CondensedBody`. A
+        rigid body has no cells.
         """
         return [body.stresses(part, factor) for body, part in self._all_unknowns(q, factor)]
 
@@ -365,7 +380,7 @@ class Scene:
         bodies = self.bodies
         if upright and any((body.frame != bodies[0].frame).any() for body in bodies):
             raise MisuseError("upright", "bodies with different axes", "bodies that have the same axes")
-        turn = bodies[0].frame if upright else np.eye(2)
+        turn = bodies[0].frame if upright else np.eye(self.dim)
         packed = pack_bodies(bodies, self.slave)
         body_of_node = np.repeat(np.arange(len(bodies)), packed["count"].astype(np.int64))
         cells, contact = (packed[name].astype(np.int64) for name in ("cells", "contact"))
@@ -390,7 +405,7 @@ class Scene:
             imposed=packed["imposed"] * scale,
             load=packed["load"] * scale,
             start=scale * moves - moved,
-            axes=np.tile([1.0, 0.0], (len(bodies), 1)) if upright else packed["axis"],
+            axes=np.array([np.eye(self.dim)[: self.dim - 1]] * len(bodies)) if upright else packed["axis"],
             young=packed["young"],
             poisson=packed["poisson"],
             penalty=self.penalty,
@@ -410,7 +425,7 @@ class Scene:
         parts = zip(map(partial(_move_freely, factor=1.0), self.condensed_bodies), self.unknowns, strict=True)
         free = [np.zeros(len(unknowns)) if part is None else part for part, unknowns in parts]
         positions = self.positions(np.concatenate([np.zeros(0), *free]))
-        there = replace(self.interface, nodes=positions.reshape(-1, 2))
+        there = replace(self.interface, nodes=positions.reshape(-1, self.dim))
         return float(min(ways_to_master(each)[0].min() for each in (there, there.swap_roles())))
 
     def _all_unknowns(self, q: FloatArray, factor: float) -> list[tuple[CondensedBody, FloatArray]]:
@@ -488,7 +503,7 @@ class WholeScene(Scene):
 
     @cached_property
     def unknowns(self) -> tuple[IntArray, ...]:
-        """The unknowns of each body within reach: 2 × node + component of all that is free."""
+        """The unknowns of each body within reach: dim × node + component of all that is free."""
         return tuple(np.flatnonzero(~body.fixed.reshape(-1)) for body in self._reached)
 
     @cached_property
@@ -508,9 +523,9 @@ class WholeScene(Scene):
 
     @cached_property
     def _rows(self) -> tuple[Any, ...]:
-        """The rows (n_unknowns, 2 n_nodes) of the stiffness of each body within reach."""
+        """The rows (n_unknowns, dim × n_nodes) of the stiffness of each body within reach."""
         rows = []
         for body, free in zip(self._reached, self.unknowns, strict=True):
-            nothing = (2 * len(body.nodes),) * 2
+            nothing = (body.nodes.size,) * 2
             rows.append(sparse.csr_array(nothing if body.rigid else assemble_stiffness(body)[0])[free])
         return tuple(rows)

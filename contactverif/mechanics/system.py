@@ -19,6 +19,7 @@ from scipy import linalg, sparse
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray, dense
 from contactverif.contract.errors import ContractError
 from contactverif.contract.formulation import Pairing
+from contactverif.contract.interface import PLANE
 from contactverif.contract.subject import CheckedFormulation, lazy
 from contactverif.mechanics.linear import Step, solve_step
 from contactverif.mechanics.scene import Scene
@@ -29,8 +30,8 @@ AGREEMENT = 1e-6
 KINK = 1e-3
 ROUNDOFF_FACTOR = 8.0  # Forces are rounded, and a residual is zero, by so many units of roundoff of the largest terms.
 MANY_UNKNOWNS = 200  # From so many on, products of sparse matrices take less time than those of full ones.
-# Forces at a node depend on its neighbours, on the segments that these face, and on the neighbours of those: the
-# longest slave segment and the longest master segment together, times this.
+# Forces at a node depend on its neighbours, on the segments or faces that these face, and on the neighbours of those:
+# the diagonals of the largest boxes around one of the slave and around one of the master together, times this.
 REACH = 1.5
 _SEED = 2009
 
@@ -43,7 +44,8 @@ class Differences:
     z: FloatArray  # (n,) The state: positions, then multipliers.
     steps: FloatArray  # (n,) The step of each unknown, in its own unit.
     sizes: FloatArray  # (n,) What each unknown is rounded like, in its own unit: the largest one of its kind.
-    n_positions: int  # The number of unknowns that are positions, two for each node.
+    n_positions: int  # The number of unknowns that are positions.
+    dim: int = PLANE  # The number of positions of a node.
 
     def away_from_kinks(self) -> Self:
         """Return differences with smaller steps, if forces have a kink within these: where contact begins, for one.
@@ -72,7 +74,7 @@ class Differences:
 
         Nodes move at once if no node is within `reach` of two of them. None if that is no less work than `by_unknown`.
         """
-        positions = self.z.reshape(-1, 2)
+        dim, positions = self.dim, self.z.reshape(-1, self.dim)
         n_nodes, distances = len(positions), np.linalg.norm(positions[:, None] - positions[None], axis=-1)
         groups = np.full(n_nodes, -1)
         for node, near in enumerate(distances <= 2 * reach):
@@ -81,12 +83,12 @@ class Differences:
         n_groups = int(groups.max()) + 1
         if 2 * n_groups > n_nodes:
             return None
-        shifts = np.zeros((n_groups, 2, n_nodes, 2))
-        for component in (0, 1):
-            shifts[groups, component, np.arange(n_nodes), component] = self.steps.reshape(-1, 2)[:, component]
-        changes = self._along(shifts.reshape(2 * n_groups, -1)).reshape(n_groups, 2, n_nodes, 2)
+        shifts = np.zeros((n_groups, dim, n_nodes, dim))
+        for component in range(dim):
+            shifts[groups, component, np.arange(n_nodes), component] = self.steps.reshape(-1, dim)[:, component]
+        changes = self._along(shifts.reshape(dim * n_groups, -1)).reshape(n_groups, dim, n_nodes, dim)
         rows, columns = np.nonzero(distances <= reach)
-        derivative = np.zeros((n_nodes, 2, n_nodes, 2))
+        derivative = np.zeros((n_nodes, dim, n_nodes, dim))
         derivative[rows, :, columns, :] = changes[groups[columns], :, rows, :].transpose(0, 2, 1)
         return derivative.reshape(len(self.z), -1) / self.steps
 
@@ -99,7 +101,8 @@ class Differences:
         (direction, before, after), terms = self._probe, abs(matrix)
         rounded = terms @ self.sizes + np.maximum(np.abs(before), np.abs(after))
         allowed = AGREEMENT * (terms @ np.abs(direction)) + ROUNDOFF_FACTOR * UNIT_ROUNDOFF * rounded
-        allowed[: self.n_positions] = allowed[: self.n_positions].reshape(-1, 2).max(axis=1).repeat(2)
+        of_nodes = allowed[: self.n_positions].reshape(-1, self.dim)
+        of_nodes[:] = of_nodes.max(axis=1, keepdims=True)
         return bool((np.abs(matrix @ direction - (after - before) / 2) <= allowed).all())
 
     @lazy
@@ -255,8 +258,8 @@ class System:
         """Return the derivative (n_unknowns, n_unknowns) of the contact forces at z, by central differences."""
         interface, formulation = self.scene.interface, self.formulation
         positions, multipliers = z[: interface.n_unknowns], z[interface.n_unknowns :]
-        lengths = [side.lengths(positions.reshape(-1, 2)) for side in (interface.slave, interface.master)]
-        shortest, largest = min(part.min() for part in lengths), float(np.abs(positions).max())
+        nodes, sides = positions.reshape(-1, interface.dim), (interface.slave, interface.master)
+        shortest, largest = min(side.heights(nodes).min() for side in sides), float(np.abs(positions).max())
         smooth = shortest * (UNIT_ROUNDOFF * largest / shortest) ** (1 / 3)
         steps = np.full(z.size, smooth if self.difference_step is None else self.difference_step)
         sizes = np.full(z.size, largest)
@@ -264,7 +267,7 @@ class System:
             size = np.abs(multipliers).max() or (abs(self.scene.stiffness).max() if self.scene.n_free else 0.0)
             steps[len(positions) :] = sizes[len(positions) :] = size or 1.0
         residual = partial(formulation.residual, interface, pairing)
-        differences = Differences(residual, z, steps, sizes, len(positions))
+        differences = Differences(residual, z, steps, sizes, len(positions), interface.dim)
         if not self.any_matrix:
             return differences.by_unknown()
         differences, matrix = differences.away_from_kinks(), None
@@ -273,5 +276,6 @@ class System:
                 matrix = formulation.tangent(interface, pairing, z)
         if matrix is not None and differences.confirm(matrix):
             return matrix
-        groups = None if len(multipliers) else differences.by_groups(REACH * sum(part.max() for part in lengths))
+        reach = REACH * sum(np.linalg.norm(np.ptp(nodes[side.faces], axis=1), axis=1).max() for side in sides)
+        groups = None if len(multipliers) else differences.by_groups(reach)
         return groups if groups is not None and differences.confirm(groups) else differences.by_unknown()

@@ -145,7 +145,7 @@ def exact_unknowns(scene: Scene, pressure: float, penalty: float) -> FloatArray:
     down = {True: -pressure * (master + 1 / penalty), False: -pressure * master}
     return np.concatenate(
         [
-            np.where(unknowns % 2 == 1, down[index in scene.slave], 0.0)
+            np.where(unknowns % scene.dim == scene.dim - 1, down[index in scene.slave], 0.0)
             for index, unknowns in zip(scene.bodies_in_reach, scene.unknowns, strict=True)
         ]
     )

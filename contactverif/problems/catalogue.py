@@ -13,7 +13,7 @@ Source: Zavarise & De Lorenzis, IJNME 79 (2009) 379–416, Sections 4, 5 and 7.
 import inspect
 import itertools
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from math import cos, inf, radians, sin
 from typing import Any, Literal
@@ -28,6 +28,8 @@ from contactverif.mechanics.newton import DIVERGENCE_FACTOR
 from contactverif.mechanics.scene import Scene
 from contactverif.problems.blocks import two_blocks
 from contactverif.problems.disk import DiskProblem, disk_on_foundation
+from contactverif.problems.named_states import FLAT_IN_SPACE, named_case
+from contactverif.problems.space_blocks import space_blocks
 
 MODERATE_PENALTY = 10.0  # The dimensionless penalty ε̂ h / E of a scene, unless one is given.
 _MATERIAL = "E = 1e4, ν = 0.3 in both; rollers at all sides; heights; two layers of cells"
@@ -130,8 +132,19 @@ SCENES: Mapping[str, NamedScene] = {
 
 
 def load_scene_case(text: str) -> Case:
-    """Return the scene that the text names as a case; see `load_scene`."""
-    return load_scene(text, "scene").case()
+    """Return the scene that the text names as a case; see `load_scene`.
+
+    The name of a flat state in space stands for two blocks over it, as a witness of what such a state shows.
+    """
+    if text not in FLAT_IN_SPACE.values():
+        return load_scene(text, "scene").case()
+    state = named_case(text)
+    plane, domain, layers = state.parameters["plane"], state.parameters["domain"], ([0.5, 0.5], [0.5, 0.5])
+    materials: dict[str, Any] = {"young": (1.0, 3.0), "poisson": (0.3, 0.2)}
+    scene = space_blocks(
+        state.interface, plane, domain, layers=layers, **materials, penalty=MODERATE_PENALTY, approach=2.0**-6
+    )
+    return replace(scene, name=text).case()
 
 
 def load_scene(text: str, argument: str = "--scene") -> Scene:

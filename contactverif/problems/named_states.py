@@ -170,7 +170,7 @@ _OTHERS: dict[str, Callable[[], Case]] = {
 }
 FLAT_NAMES: tuple[str, ...] = tuple(_FLAT)
 NAMED: tuple[str, ...] = (*FLAT_NAMES, *_OTHERS)
-_FLAT_IN_SPACE = {TRIANGLE: "crossed-diagonals", QUADRILATERAL: "crossed-halves"}  # They penetrate uniformly.
+FLAT_IN_SPACE = {TRIANGLE: "crossed-diagonals", QUADRILATERAL: "crossed-halves"}  # They penetrate uniformly.
 _TILTED_IN_SPACE = {TRIANGLE: "tilted-faces", QUADRILATERAL: "tilted-halves"}
 # Its lengths of 3.2 and 2.8 are rounded: on A1 single precision makes no error.
 _FIRST = "c-prime"
@@ -178,7 +178,7 @@ _FIRST = "c-prime"
 
 def flat_in_space(traits: Traits) -> str:
     """Return the name of a flat interface in space that penetrates uniformly, of faces that a formulation takes."""
-    return _FLAT_IN_SPACE[min(traits.abilities.faces)]
+    return FLAT_IN_SPACE[min(traits.abilities.faces)]
 
 
 def tilted_in_space(faces: tuple[int, ...] = (TRIANGLE,)) -> tuple[Case, ...]:

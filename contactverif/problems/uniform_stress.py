@@ -6,9 +6,10 @@ the same solution has the same error and the same tolerance everywhere.
 Rules for the next editor: a formula is written once as text, beside the function that computes it, and whoever prints a
 tolerance prints that text. A change of a formula changes both, and `docs/concepts/tolerances.md`.
 
-Symbols: κ is the greater of ε̂h and the stiffer body's E over the softer body's E; h is the mean slave segment; r is the
-ratio of the shortest to the longest segment; u = 2⁻⁵³; X is the largest coordinate; M is the stiffer body's oedometer
-modulus; U is the largest displacement; ℓ is the shortest segment; p is the exact pressure.
+Symbols: κ is the greater of ε̂h and the stiffer body's E over the softer body's E; h is the mean slave segment, in space
+the root of the mean face; r is the ratio of the shortest to the longest segment, in space of heights of faces; u is 2⁻⁵³; X
+is the largest coordinate; M is the stiffer body's oedometer modulus; U is the largest displacement; ℓ is the shortest
+segment; p is the exact pressure.
 """
 
 from collections.abc import Sequence
@@ -18,7 +19,7 @@ import numpy as np
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray
 from contactverif.contract.case import Case
-from contactverif.contract.interface import Interface
+from contactverif.contract.interface import PLANE, Interface
 from contactverif.mechanics.accuracy import Solution, shape_integrals
 from contactverif.mechanics.scene import Scene
 from contactverif.problems.blocks import pressure_of
@@ -42,22 +43,23 @@ def stress_error(scene: Scene, stresses: Sequence[FloatArray], pressure: float |
     for index in scene.bodies_in_reach:
         body = scene.bodies[index]
         if not body.rigid:
-            exact = np.array([-pressure * body.poisson / (1 - body.poisson), -pressure, 0.0])
+            aside, shears = -pressure * body.poisson / (1 - body.poisson), 1 if scene.dim == PLANE else 3
+            exact = np.array([*[aside] * (scene.dim - 1), -pressure, *[0.0] * shears])
             largest = max(largest, float(np.abs(stresses[index] - exact).max(initial=0.0)))
     return largest / pressure
 
 
 def _segment_lengths(scene: Scene) -> tuple[float, float]:
-    """Return the shortest reference length of all segments, and its ratio to the longest."""
+    """Return the shortest reference length of all segments, or least height of faces, and its ratio to the longest."""
     interface = scene.interface
-    lengths = np.concatenate([side.lengths(interface.nodes) for side in (interface.slave, interface.master)])
+    lengths = np.concatenate([side.heights(interface.nodes) for side in (interface.slave, interface.master)])
     return float(lengths.min()), float(lengths.min() / lengths.max())
 
 
 def condition_tolerance(scene: Scene, penalty: float) -> float:
     """Return what the solution of the linear system may add to a stress over p: CONDITION_TOLERANCE as a number."""
     young = [body.young for body in scene.bodies if not body.rigid]
-    h = float(scene.interface.slave.lengths(scene.interface.nodes).mean())
+    h = float(scene.interface.slave.measures(scene.interface.nodes).mean()) ** (1 / (scene.dim - 1))
     return 1e-11 + 1e-13 * max(penalty * h, *young) / min(young) + 5e-15 / _segment_lengths(scene)[1]
 
 

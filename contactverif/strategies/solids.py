@@ -28,12 +28,12 @@ VARIANTS = ("rigid master", "unequal materials", "inclined", "sliding", "punch")
 INCLINATIONS = (1.0, 17.3, 45.0, 90.0, 179.0)
 POSITIONS = 200  # The number of positions of a punch that slides over one master segment.
 _LAYERS = st.lists(st.integers(1, 4), min_size=1, max_size=3)
-_POISSON = st.sampled_from([0.0, 0.25, 0.3, 0.125, 0.375, 0.4375])
+POISSON = st.sampled_from([0.0, 0.25, 0.3, 0.125, 0.375, 0.4375])
 _CLOSED_TILTS = st.sampled_from([1, 2, 3, 4, 5, 6])  # Thirteenths of the approach: all of the interface is in contact.
 _TILTS = st.sampled_from([1, 2, 3, 4, 5, 6, 13, 16, 20, 26])  # From 13 on contact ends within the interface.
 # Stiffer springs get a larger approach, so that gaps are far longer than the steps that Newton's method is judged by.
-_SMALLEST_STRAIN = {10.0: 6, 64.0: 5}  # The exponents of the smallest strain 2^-e.
-_STRAINS = st.integers(3, 8).map(lambda e: 2.0**-e)
+SMALLEST_STRAIN = {10.0: 6, 64.0: 5}  # The exponents of the smallest strain 2^-e.
+STRAINS = st.integers(3, 8).map(lambda e: 2.0**-e)
 _OVERHANGS = st.sampled_from([(1, 0), (0, 1), (1, 1), (1, -1), (-1, 1)])  # Left and right; −1: the master overhangs.
 _PARTS = 8  # A master may end at this many parts of a slave segment.
 _PART = st.sampled_from([4, 2, 6, 1, 3, 5, 7])
@@ -41,9 +41,9 @@ _WIDER = st.integers(1, 4)
 _VARIANTS = st.integers(0, len(VARIANTS) - 1)
 _SEVENTHS = st.integers(1, 6)
 # Distributed stiffness ε̂ h / E of tilted blocks and of those with a dead zone.
-_STIFF, _DEAD_STIFF = st.sampled_from([1.0, 10.0, 0.125, 64.0]), st.sampled_from([MODERATE_PENALTY, 1.0, 100.0])
-_TILTED_STRAINS = st.integers(5, 8)  # The exponents of a strain 2^-e.
-_MODULI = st.builds(ldexp, st.integers(1, 8).map(float), st.integers(-3, 3))
+STIFF, _DEAD_STIFF = st.sampled_from([1.0, 10.0, 0.125, 64.0]), st.sampled_from([MODERATE_PENALTY, 1.0, 100.0])
+TILTED_STRAINS = st.integers(5, 8)  # The exponents of a strain 2^-e.
+MODULI = st.builds(ldexp, st.integers(1, 8).map(float), st.integers(-3, 3))
 
 
 @cache
@@ -100,8 +100,8 @@ def _uniform(scene: Case, *, overhang: bool) -> SearchStrategy[Case] | None:
 def _two_blocks(draw: DrawFn) -> Case:
     slave, master = draw(_widths()), draw(_widths())
     layers = draw(_LAYERS), draw(_LAYERS)
-    young, poisson = (draw(_MODULI), draw(_MODULI)), (draw(_POISSON), draw(_POISSON))
-    strain, motion, seed = draw(_STRAINS), draw(motions(furthest=16)), draw(SEEDS)
+    young, poisson = (draw(MODULI), draw(MODULI)), (draw(POISSON), draw(POISSON))
+    strain, motion, seed = draw(STRAINS), draw(motions(furthest=16)), draw(SEEDS)
     x = ends_of(slave)
     return _scene(x, _cut(master, x[-1]), layers, young, poisson, motion, strain=strain).case(seed=seed)
 
@@ -111,7 +111,7 @@ def _variants(draw: DrawFn) -> Case:
     variant = draw(_VARIANTS)
     slave, master = draw(lengths(graded=False)), draw(lengths(graded=False))
     layers = draw(_LAYERS), draw(_LAYERS)
-    strain, poisson, seed = draw(_STRAINS), (draw(_POISSON), draw(_POISSON)), draw(SEEDS)
+    strain, poisson, seed = draw(STRAINS), (draw(POISSON), draw(POISSON)), draw(SEEDS)
     name, beside = VARIANTS[variant], (0, 0)
     ratio = 10.0 ** draw(st.integers(-6, 6)) if name == "unequal materials" else 1.0
     angle = np.radians(draw(st.sampled_from(INCLINATIONS)) if name == "inclined" else 0.0)
@@ -149,8 +149,8 @@ def _dead_zones(draw: DrawFn) -> Case:
     master = draw(_widths())
     unit = float(x[-1]) / 4  # a thin body bends at nearly no force, and its stress would be roundoff
     layers = tuple([unit * height for height in draw(_LAYERS)] for _ in range(2))
-    young, poisson = (draw(_MODULI), draw(_MODULI)), (draw(_POISSON), draw(_POISSON))
-    strain, motion, seed = draw(_STRAINS), draw(motions(furthest=16)), draw(SEEDS)
+    young, poisson = (draw(MODULI), draw(MODULI)), (draw(POISSON), draw(POISSON))
+    strain, motion, seed = draw(STRAINS), draw(motions(furthest=16)), draw(SEEDS)
     stiff = draw(_DEAD_STIFF)
     master_x = begin + _cut(master, float(end - begin))
     pressure = strain * min(young)
@@ -161,11 +161,11 @@ def _dead_zones(draw: DrawFn) -> Case:
 def _tilted_blocks(draw: DrawFn, tilts: SearchStrategy[int]) -> Case:
     slave, master = draw(lengths(graded=False)), draw(lengths(graded=False))
     layers = draw(_LAYERS), draw(_LAYERS)
-    young, poisson = (draw(_MODULI), draw(_MODULI)), (draw(_POISSON), draw(_POISSON))
-    exponent, motion, seed = draw(_TILTED_STRAINS), draw(motions(furthest=16)), draw(SEEDS)
+    young, poisson = (draw(MODULI), draw(MODULI)), (draw(POISSON), draw(POISSON))
+    exponent, motion, seed = draw(TILTED_STRAINS), draw(motions(furthest=16)), draw(SEEDS)
     tilt, sevenths = draw(tilts), draw(_SEVENTHS)
-    stiff = draw(_STIFF)
-    strain = 2.0 ** -min(exponent, _SMALLEST_STRAIN.get(stiff, exponent))
+    stiff = draw(STIFF)
+    strain = 2.0 ** -min(exponent, SMALLEST_STRAIN.get(stiff, exponent))
     x = ends_of(slave)
     # The slave's nodes are moved by different sevenths and elevenths, so that no two of its points fall on one kink.
     moved = x + sevenths / 7 + repeat_cyclically([0.0, 1 / 11, 3 / 11, 2 / 11], len(x)) / 4

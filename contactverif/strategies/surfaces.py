@@ -42,10 +42,15 @@ class SpaceMotion:
         return ldexp(float(rotation(self.quaternion)[1] if self.whole else 1), self.exponent)
 
     @property
+    def axes(self) -> FloatArray:
+        """The unit vectors (3, 3) that the axes become, as rows."""
+        rows, size = rotation(self.quaternion)
+        return np.array(rows).T / size
+
+    @property
     def normal(self) -> FloatArray:
         """The unit vector (3,) that the z-axis becomes."""
-        rows, size = rotation(self.quaternion)
-        return np.array(rows)[:, 2] / size
+        return self.axes[2]
 
     def __call__(self, points: FloatArray) -> FloatArray:
         """Return the points (n, 3), moved; each coordinate is rounded once, from extended precision."""

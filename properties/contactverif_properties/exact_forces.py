@@ -92,9 +92,10 @@ def gap_error(case: Case, penetration: float, size: float) -> float:
     """
     heights = case.positions @ normal_of(case)
     n_slave = case.interface.n_slave_nodes
-    slave, master = np.split(case.parameters["along"], [n_slave])
-    order = np.argsort(slave)
-    heights[:n_slave] = np.interp(np.clip(slave, master.min(), master.max()), slave[order], heights[:n_slave][order])
+    if case.interface.dim == PLANE:
+        slave, master = np.split(case.parameters["along"], [n_slave])
+        order, places = np.argsort(slave), np.clip(slave, master.min(), master.max())
+        heights[:n_slave] = np.interp(places, slave[order], heights[:n_slave][order])
     level = heights[n_slave:].mean()
     errors = np.abs(heights - level + np.where(np.arange(len(heights)) < n_slave, penetration, 0.0))
     return float(errors.max() / size)

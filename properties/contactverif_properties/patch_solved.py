@@ -29,6 +29,7 @@ from contactverif.problems.block_scenes import normal_scenes, single_scenes
 from contactverif.problems.blocks import exact_unknowns, pressure_of
 from contactverif.problems.uniform_stress import PRESSURE_TOLERANCE, STRESS_TOLERANCE, stress_error, uniform_tolerances
 from contactverif.strategies.solids import UNIFORM, block_cases, dead_zone_cases, variant_cases
+from contactverif.strategies.space_solids import space_block_cases, space_variant_cases
 from contactverif_properties import exact_forces
 from contactverif_properties.applicability import promise_normal, promise_single
 from contactverif_properties.newton_method import end_details
@@ -96,12 +97,12 @@ def _judge_reports(
     exact, n_slave = exact_forces.consistent_forces(case, pressure), case.interface.n_slave_nodes
     if answer.contact_forces is not None:
         differences = np.linalg.norm(answer.contact_forces[scene.nodes_in_reach] - exact, axis=1)
-        errors[REPORTED_FORCES] = float(differences.max() / (pressure * case.slave_length)), 1.0
+        errors[REPORTED_FORCES] = float(differences.max() / (pressure * case.slave_measure)), 1.0
     if answer.pressures is not None:
         places = np.argsort(np.argsort(scene.nodes_in_reach[:n_slave]))  # Reports are in the order of the numbers.
         lengths = shape_integrals(case.interface.slave, case.interface.nodes)[:n_slave]
         covered = np.linalg.norm(exact[:n_slave], axis=1) >= (1 - ALMOST) * pressure * lengths
-        shares = lengths[covered] / case.slave_length
+        shares = lengths[covered] / case.slave_measure
         differences = np.abs(answer.pressures[places][covered] / pressure - 1)
         errors[REPORTED_PRESSURES] = float(differences.max(initial=0.0)), float(shares.min(initial=1.0))
     return errors
@@ -115,7 +116,7 @@ def _rigid_nodes(scene: Scene) -> BoolArray:
 
 def _by_side(case: Case, errors: FloatArray, pressure: float) -> tuple[float, float]:
     """Return the largest error of a nodal force (n_nodes,) on the slave and on the master, over p L."""
-    slave, master = np.split(errors / (pressure * case.slave_length), [case.interface.n_slave_nodes])
+    slave, master = np.split(errors / (pressure * case.slave_measure), [case.interface.n_slave_nodes])
     return float(slave.max()), float(master.max())
 
 
@@ -126,7 +127,7 @@ def engine_tolerance(scene: Scene, solution: Solution, accuracy: float, pressure
     """
     modulus = max(body.oedometric_modulus for body in scene.bodies if not body.rigid)
     nodes, stiffness = scene.interface.nodes, dense(scene.stiffness)
-    shortest = min(float(side.lengths(nodes).min()) for side in (scene.interface.slave, scene.interface.master))
+    shortest = min(float(side.heights(nodes).min()) for side in (scene.interface.slave, scene.interface.master))
     displacement = min(float(np.abs(solution.displacements).max()), float(np.ptp(nodes, axis=0).max()))
     sizes: FloatArray = np.abs(np.linalg.eigvalsh(stiffness)) if len(stiffness) else np.ones(1)
     resisted = sizes[sizes > len(sizes) * UNIT_ROUNDOFF * sizes.max()]  # Motions of a free body are not resisted.
@@ -370,7 +371,11 @@ _define_at_two_penalties = partial(_define, quantities=(*QUANTITIES, *map(_at_hi
 
 
 @_define_at_two_penalties(
-    id="patch.flat.solve", rank=675, cases=Cases.random(block_cases), promise=lambda traits: traits.promises.patch.flat
+    id="patch.flat.solve",
+    rank=675,
+    cases=Cases.random(block_cases),
+    cases_in_space=Cases.random(space_block_cases),
+    promise=lambda traits: traits.promises.patch.flat,
 )
 def patch_flat_solve(case: Case, subject: Subject) -> Measurement:
     """Two elastic blocks under a uniform pressure find the exact stress, forces and gap at two penalties.
@@ -457,6 +462,7 @@ def patch_flat_single_solve(case: Case, subject: Subject) -> Measurement:
     rank=680,
     quantities=(*QUANTITIES, MULTIPLIERS),
     cases=Cases.random(variant_cases),
+    cases_in_space=Cases.random(space_variant_cases),
     promise=lambda traits: traits.promises.patch.flat,
 )
 def patch_variants(case: Case, subject: Subject) -> Measurement:

@@ -84,7 +84,7 @@ WITH_A_NODE: dict[str, Any] = {  # One node more than the cells use.
 WRONG = [
     *rows("poisson", repr, NU, 0.5, -1.0, np.nan, None),
     *rows("young", repr, "Young's modulus > 0", 0.0, -1e4, np.nan, np.inf, "1e4", True, np.array([1.0, 2.0])),
-    *rows("nodes", shape_of, "shape (n, 2)", np.zeros((9, 3)), np.zeros(18)),
+    *rows("nodes", shape_of, "shape (n, 2)", np.zeros((9, 4)), np.zeros(18)),
     *rows("cells", shape_of, "shape (n, 4)", np.zeros((2, 5), int), np.arange(4), "quads"),
     *rows("contact", shape_of, "shape (n, 2)", [[0, 1, 2]]),
     *rows("fixed", shape_of, "shape (9, 2)", BLOCK.fixed[:3]),

@@ -1,0 +1,161 @@
+"""Blocks in space over flat grids of faces: tetrahedra behind triangles, hexahedra behind quadrilaterals.
+
+A block is its contact surface, extruded. Its sides cannot move sideways, so that the pressure of two blocks is uniform
+and known exactly, whatever the grids. Where the master is larger than the slave, the pressure also acts on its part
+beside the slave.
+"""
+
+from collections.abc import Sequence
+from typing import Protocol
+
+import numpy as np
+
+from contactverif.contract.arrays import BoolArray, FloatArray, IntArray
+from contactverif.contract.body import Body
+from contactverif.contract.interface import TRIANGLE, Interface, Surface
+from contactverif.mechanics.scene import Scene
+from contactverif.oracle.flat_answers import uniform_surface_weights
+
+
+class Motion(Protocol):
+    """A similarity of a drawing: it takes points (n, 3) to where they lie."""
+
+    @property
+    def axes(self) -> FloatArray:
+        """The unit vectors (3, 3) that the axes of the drawing become, as rows."""
+
+    @property
+    def scale(self) -> float:
+        """The factor of all lengths."""
+
+    def __call__(self, points: FloatArray, /) -> FloatArray:
+        """Return the points, moved."""
+
+
+def extrude(faces: IntArray, n_nodes: int, n_layers: int) -> IntArray:
+    """Return the cells (n_cells, 4 or 8) behind faces (n_faces, 3 or 4) of nodes numbered from 0, seen from outside.
+
+    Layer k has the nodes of the faces + k n_nodes. A prism behind a triangle is cut into three tetrahedra, on its sides
+    along the diagonals that begin at the lower number, so that neighbours share them.
+    """
+    if faces.shape[1] != TRIANGLE:
+        cells = np.hstack([faces[:, ::-1], faces[:, ::-1] + n_nodes])
+    else:
+        a, b, c = np.sort(faces, axis=1).T
+        # Sorted corners run as those of the face do, or against them: then two change places.
+        first = faces.argmin(axis=1)[:, None]
+        along = (np.take_along_axis(faces, (first + 1) % 3, axis=1) == b[:, None])[:, 0]
+        d, e, f = a + n_nodes, b + n_nodes, c + n_nodes
+        parts = ((a, b, c, f), (a, b, f, e), (a, e, f, d))
+        cells = np.vstack([np.where(along, [p, r, q, s], [p, q, r, s]).T for p, q, r, s in parts])
+    return np.vstack([cells + layer * n_nodes for layer in range(n_layers)])
+
+
+def space_blocks(
+    interface: Interface,
+    plane: FloatArray,
+    domain: FloatArray,
+    *,
+    layers: tuple[Sequence[float], Sequence[float]],
+    young: tuple[float, float],
+    poisson: tuple[float, float],
+    penalty: float,
+    pressure: float | None = None,
+    approach: float | None = None,
+    tilt: tuple[float, float] = (0.0, 0.0),
+    rigid_master: bool = False,
+    motion: Motion | None = None,
+) -> Scene:
+    """Return the scene of a slave block that is pressed down on a master block, or on a rigid floor.
+
+    Parameters
+    ----------
+    interface : Interface
+        The contact surfaces in the plane z = 0.
+    plane : FloatArray, shape (n_nodes, 2)
+        The coordinates of its nodes in that plane.
+    domain : FloatArray, shape (n_corners, 2)
+        The corners of what both surfaces cover, all of the slave.
+    layers : tuple[Sequence[float], Sequence[float]]
+        The heights of the layers of cells of slave and master, a length each.
+    young, poisson : tuple[float, float]
+        The materials of slave and master.
+    penalty : float
+        The distributed stiffness ε̂, force per area per length of penetration.
+    pressure : float | None
+        The pressure on top of the slave, force per area, and on what the master has beside it. Either this or
+        `approach` is given.
+    approach : float | None
+        The displacement of the top of the slave towards the master, a length.
+    tilt : tuple[float, float]
+        The further approach of the top for each unit of length along both coordinates of the plane, from the middle of
+        the domain. With a tilt no exact pressure is known.
+    rigid_master : bool
+        True replaces the master by its surface, held.
+    motion : Motion | None
+        The rotation, shift and scale of the drawing; lengths of all other arguments are those before it.
+
+    Returns
+    -------
+    Scene
+        Its facts are "plane", "domain", "normal" (3,) out of the master, and, if the pressure is known exactly,
+        "compliance" (2,) and "pressure" or "approach".
+    """
+    n_slave, axes, scale = interface.n_slave_nodes, np.eye(3), 1.0
+    if motion is not None:
+        axes, scale = motion.axes, motion.scale
+    low, high = plane.min(axis=0), plane.max(axis=0)
+    around = np.array([low, [high[0], low[1]], high, [low[0], high[1]]])
+    whole, inside = (uniform_surface_weights(interface, plane, part) for part in (around, domain))
+    places, bodies, compliances = np.split(plane, [n_slave]), [], []
+    middle, depth = domain.mean(axis=0), approach if approach is not None else (pressure or 0.0) / penalty / scale
+    for index, (surface, start) in enumerate(((interface.slave, 0), (interface.master, n_slave))):
+        faces, flat, sign = surface.faces - start, places[index], (1.0, -1.0)[index]
+        n, rigid = len(flat), bool(index and rigid_master)
+        levels = np.cumsum([0.0, *([] if rigid else layers[index])])
+        nodes = np.column_stack([np.tile(flat, (len(levels), 1)), np.repeat(sign * levels, n)])
+        fixed, imposed, load = (np.zeros(nodes.shape, kind) for kind in (bool, float, float))
+        fixed[:, :2] = np.tile(_held_sides(Surface(faces), flat), (len(levels), 1))
+        far = slice(len(nodes) - n, len(nodes))
+        if rigid:
+            fixed[:] = True
+        elif index:
+            fixed[far, 2] = True
+            load[:n, 2] = -(pressure or 0.0) * scale**2 * (whole - inside)[n_slave:]
+        elif approach is not None:
+            fixed[far, 2], imposed[far, 2] = True, -(approach + (flat - middle) @ tilt) * scale
+        else:
+            load[far, 2] = -(pressure or 0.0) * scale**2 * whole[:n_slave]
+        body = Body(
+            nodes=nodes if motion is None else motion(nodes),
+            cells=np.zeros((0, 8), np.int64) if rigid else extrude(faces, n, len(levels) - 1),
+            contact=faces,
+            young=young[index],
+            poisson=poisson[index],
+            fixed=fixed,
+            imposed=imposed,
+            load=load,
+            axis=axes[:2],
+            start=np.array([0.0, 0.0, 0.0 if index else -depth * scale]),
+            name=("slave", "master")[index],
+        )
+        bodies.append(body)
+        compliances.append(levels[-1] / body.oedometric_modulus * scale)
+    facts = {"plane": plane * scale, "domain": domain * scale, "normal": axes[2]}
+    if not any(tilt):
+        facts["compliance"] = np.array(compliances)
+        facts |= {"approach": np.array(approach * scale)} if approach is not None else {"pressure": np.array(pressure)}
+    return Scene(tuple(bodies), penalty=penalty, facts=facts)
+
+
+def _held_sides(surface: Surface, plane: FloatArray) -> BoolArray:
+    """Return which of both components (n, 2) of each node the rollers at the sides hold.
+
+    A side along an axis is held across it; one that is inclined against the axes holds both.
+    """
+    face, edge = np.nonzero(surface.neighbours < 0)
+    ends = np.stack([surface.faces[face, edge], surface.faces[face, (edge + 1) % surface.faces.shape[1]]], axis=1)
+    held = np.zeros(plane.shape, bool)
+    across = np.diff(plane[ends], axis=1)[:, 0, ::-1] != 0  # Across an edge along the first axis is the second one.
+    np.logical_or.at(held, ends, across[:, None])
+    return held

@@ -1,0 +1,113 @@
+"""Random scenes in space: two elastic blocks over grids of faces, pressed together, as `solids` has in the plane."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+from hypothesis import strategies as st
+from hypothesis.strategies import DrawFn, SearchStrategy
+
+from contactverif.contract.case import Case, random_source
+from contactverif.contract.interface import TRIANGLE
+from contactverif.mechanics.scene import Scene, has_bodies
+from contactverif.problems.blocks import is_uniform
+from contactverif.problems.catalogue import MODERATE_PENALTY
+from contactverif.problems.space_blocks import space_blocks
+from contactverif.strategies import samples, solids
+from contactverif.strategies.surfaces import SpaceMotion, SurfacePair, space_motions, surface_pairs
+
+VARIANTS = ("rigid master", "unequal materials", "punch")
+MOST_CELLS = 4  # Along each side of a block.
+_LAYERS = st.lists(st.sampled_from([0.5, 0.25, 1.0]), min_size=1, max_size=2)
+_BOTH_LAYERS = st.tuples(_LAYERS, _LAYERS)
+_POISSON = st.tuples(solids.POISSON, solids.POISSON)
+_YOUNG = st.tuples(solids.MODULI, solids.MODULI)
+
+
+def _on_scene(
+    draw_scene: Callable[[DrawFn, tuple[int, ...]], Case], name: str, *, uniform: bool = True
+) -> Callable[..., SearchStrategy[Case] | None]:
+    """Return the cases of a function that draws one on some faces; given a scene, that scene alone if it fits."""
+    drawn = st.composite(draw_scene)
+
+    def make(scene: Case | None = None, faces: tuple[int, ...] = (TRIANGLE,)) -> SearchStrategy[Case] | None:
+        if scene is None:
+            return drawn(faces)
+        return st.just(scene) if has_bodies(scene) and (is_uniform(scene) or not uniform) else None
+
+    return random_source(f"contactverif.strategies.space_solids.{name}", solids.UNIFORM if uniform else "")(make)
+
+
+def _draw_blocks(draw: DrawFn, faces: tuple[int, ...]) -> Case:
+    pair = draw(surface_pairs(most=MOST_CELLS, stretched=False, faces=faces, straight=True))
+    layers, young, poisson = draw(_BOTH_LAYERS), draw(_YOUNG), draw(_POISSON)
+    strain, motion, seed = draw(solids.STRAINS), draw(space_motions(furthest=16)), draw(samples.SEEDS)
+    return _scene(pair, layers, young, poisson, motion, strain=strain).case(seed=seed)
+
+
+def _draw_variants(draw: DrawFn, faces: tuple[int, ...]) -> Case:
+    variant = draw(_VARIANTS)
+    name = VARIANTS[variant]
+    pairs = surface_pairs(
+        same_domain=name != "punch", most=MOST_CELLS, stretched=name == "punch", faces=faces, straight=True
+    )
+    pair, layers, poisson = draw(pairs), draw(_BOTH_LAYERS), draw(_POISSON)
+    ratio = 10.0 ** draw(_CONTRASTS) if name == "unequal materials" else 1.0
+    strain, motion, seed = draw(solids.STRAINS), draw(space_motions(furthest=16)), draw(samples.SEEDS)
+    pressure = strain * min(1.0, ratio)
+    scene = _scene(pair, layers, (1.0, ratio), poisson, motion, pressure=pressure, rigid=name == "rigid master")
+    return replace(scene, facts={**scene.facts, "variant": np.array(float(variant))}).case(seed=seed)
+
+
+_VARIANTS = st.integers(0, len(VARIANTS) - 1)
+_CONTRASTS = st.integers(-6, 6)
+_SLOPES = st.tuples(st.integers(-3, 3), st.integers(-3, 3))  # In thirteenths of the approach, over the side.
+
+
+def _draw_tilted(draw: DrawFn, faces: tuple[int, ...]) -> Case:
+    pairs = surface_pairs(same_domain=False, most=3, stretched=False, faces=faces, straight=True)
+    pair, layers, young, poisson = draw(pairs), draw(_BOTH_LAYERS), draw(_YOUNG), draw(_POISSON)
+    exponent, motion, seed = draw(solids.TILTED_STRAINS), draw(space_motions(furthest=16)), draw(samples.SEEDS)
+    slopes, stiff = draw(_SLOPES), draw(solids.STIFF)
+    strain = 2.0 ** -min(exponent, solids.SMALLEST_STRAIN.get(stiff, exponent))
+    return _scene(pair, layers, young, poisson, motion, strain=strain, slopes=slopes, stiff=stiff).case(seed=seed)
+
+
+space_block_cases = _on_scene(_draw_blocks, "space_block_cases")
+space_variant_cases = _on_scene(_draw_variants, "space_variant_cases")
+space_solid_cases = _on_scene(_draw_tilted, "space_solid_cases", uniform=False)
+
+
+def _scene(
+    pair: SurfacePair,
+    layers: tuple[list[float], list[float]],
+    young: tuple[float, float],
+    poisson: tuple[float, float],
+    motion: SpaceMotion,
+    *,
+    strain: float = 0.0,
+    pressure: float | None = None,
+    slopes: tuple[int, int] | None = None,
+    stiff: float = MODERATE_PENALTY,
+    rigid: bool = False,
+) -> Scene:
+    """Return the two blocks, pressed by an approach, or by a pressure: on a larger master no approach is uniform."""
+    interface, plane, domain = pair.lay_out()
+    approach = strain * (sum(layers[0]) + sum(layers[1]))
+    if pressure is None and slopes is None and not pair.same_domain:
+        pressure = strain * min(young)
+    mean = float(interface.slave.measures(interface.nodes).mean()) ** 0.5
+    return space_blocks(
+        interface,
+        plane,
+        domain,
+        layers=layers,
+        young=young,
+        poisson=poisson,
+        penalty=stiff * (young[0] if rigid else min(young)) / mean / motion.scale,
+        pressure=pressure,
+        approach=approach if pressure is None else None,
+        tilt=tuple(approach * slope / 13 for slope in slopes) if slopes else (0.0, 0.0),
+        rigid_master=rigid,
+        motion=motion,
+    )
