@@ -40,7 +40,7 @@ class ProblemInstance:
     """A problem on one mesh, at one penalty, for formulations of some traits, with its exact answer."""
 
     scene: Scene  # Its penalty is ε̂. With multipliers it is the scale of the contact decision.
-    forces: Callable[[FloatArray], FloatArray]  # From positions (n_nodes, 2) to the exact forces that push the nodes
+    forces: Callable[[FloatArray], FloatArray]  # From positions (n_nodes, dim) to the exact forces that push the nodes
     motions: tuple[Field, ...] = ()  # Exact displacements at reference places of the slave, and of the master if known
     pressure: Field  # The exact pressure at current places of the slave
     pressure_scale: float  # The pressure that errors of pressures are divided by
@@ -67,9 +67,9 @@ class ProblemInstance:
         return Case(self.scene.interface, self.scene.positions(self.scene.start), self.scene.penalty)
 
     def exact_forces(self, state: Case) -> FloatArray:
-        """Return the exact forces (n_nodes, 2) that push the nodes in a state of this mesh."""
+        """Return the exact forces (n_nodes, dim) that push the nodes in a state of this mesh."""
         positions = state.positions if self.deformed else state.interface.nodes
-        return _check_field("forces", self.forces, "a force for each node", 2)(positions)
+        return _check_field("forces", self.forces, "a force for each node", positions.shape[1])(positions)
 
     @property
     def best_pressure(self) -> float:
@@ -90,7 +90,7 @@ class ProblemInstance:
         for kind, surface in zip(FORCES, surfaces, strict=True):
             errors[kind] = force_error(solution.forces, exact, shape_integrals(surface, positions))
         for kind, surface, motion in zip(MOTIONS, surfaces, self.motions, strict=False):
-            checked = _check_field("motions", motion, "a vector for each place", 2)
+            checked = _check_field("motions", motion, "a vector for each place", interface.dim)
             errors[kind] = displacement_error(surface, interface.nodes, solution.displacements, checked, self.parts)
         pressure = pressure_error(solution, self._pressure, self.pressure_scale)
         if pressure is not None:

@@ -71,7 +71,7 @@ def space_blocks(
     Parameters
     ----------
     interface : Interface
-        The contact surfaces in the plane z = 0.
+        The contact surfaces in the plane z = 0, or near it: the layers of cells even out their heights.
     plane : FloatArray, shape (n_nodes, 2)
         The coordinates of its nodes in that plane.
     domain : FloatArray, shape (n_corners, 2)
@@ -107,13 +107,15 @@ def space_blocks(
     low, high = plane.min(axis=0), plane.max(axis=0)
     around = np.array([low, [high[0], low[1]], high, [low[0], high[1]]])
     whole, inside = (uniform_surface_weights(interface, plane, part) for part in (around, domain))
-    places, bodies, compliances = np.split(plane, [n_slave]), [], []
+    places, heights = (np.split(part, [n_slave]) for part in (plane, interface.nodes[:, 2]))
+    bodies, compliances = [], []
     middle, depth = domain.mean(axis=0), approach if approach is not None else (pressure or 0.0) / penalty / scale
     for index, (surface, start) in enumerate(((interface.slave, 0), (interface.master, n_slave))):
         faces, flat, sign = surface.faces - start, places[index], (1.0, -1.0)[index]
         n, rigid = len(flat), bool(index and rigid_master)
         levels = np.cumsum([0.0, *([] if rigid else layers[index])])
-        nodes = np.column_stack([np.tile(flat, (len(levels), 1)), np.repeat(sign * levels, n)])
+        flattening = np.outer(1 - levels / levels[-1] if levels[-1] else [1.0], heights[index]).reshape(-1)
+        nodes = np.column_stack([np.tile(flat, (len(levels), 1)), np.repeat(sign * levels, n) + flattening])
         fixed, imposed, load = (np.zeros(nodes.shape, kind) for kind in (bool, float, float))
         fixed[:, :2] = np.tile(_held_sides(Surface(faces), flat), (len(levels), 1))
         far = slice(len(nodes) - n, len(nodes))
@@ -142,7 +144,7 @@ def space_blocks(
         bodies.append(body)
         compliances.append(levels[-1] / body.oedometric_modulus * scale)
     facts = {"plane": plane * scale, "domain": domain * scale, "normal": axes[2]}
-    if not any(tilt):
+    if not any(tilt) and not interface.nodes[:, 2].any():
         facts["compliance"] = np.array(compliances)
         facts |= {"approach": np.array(approach * scale)} if approach is not None else {"pressure": np.array(pressure)}
     return Scene(tuple(bodies), penalty=penalty, facts=facts)

@@ -6,10 +6,10 @@ the same solution has the same error and the same tolerance everywhere.
 Rules for the next editor: a formula is written once as text, beside the function that computes it, and whoever prints a
 tolerance prints that text. A change of a formula changes both, and `docs/concepts/tolerances.md`.
 
-Symbols: κ is the greater of ε̂h and the stiffer body's E over the softer body's E; h is the mean slave segment, in space
-the root of the mean face; r is the ratio of the shortest to the longest segment, in space of heights of faces; u is 2⁻⁵³; X
-is the largest coordinate; M is the stiffer body's oedometer modulus; U is the largest displacement; ℓ is the shortest
-segment; p is the exact pressure.
+Symbols: κ is the greater of ε̂h and the stiffer body's E over the softer body's E; h is the mean slave segment, in
+space the root of the mean face; r is the ratio of the shortest to the longest segment, in space of heights of
+faces; u = 2⁻⁵³; X is the largest coordinate; M is the stiffer body's oedometer modulus; U is the largest
+displacement; ℓ is the shortest segment; p is the exact pressure.
 """
 
 from collections.abc import Sequence

@@ -61,21 +61,32 @@ def _draw_variants(draw: DrawFn, faces: tuple[int, ...]) -> Case:
 
 _VARIANTS = st.integers(0, len(VARIANTS) - 1)
 _CONTRASTS = st.integers(-6, 6)
-_SLOPES = st.tuples(st.integers(-3, 3), st.integers(-3, 3))  # In thirteenths of the approach, over the side.
+# Thirteenths of the approach over the side, along both axes: all of the interface is in contact, or a part.
+_CLOSED_SLOPES = st.tuples(*[st.sampled_from([1, 2, 3, -1, -2, -3])] * 2)
+_SLOPES = st.tuples(*[st.sampled_from([1, 2, 3, -5, 8, 13, -16, 20])] * 2)
+_BUMPS = st.sampled_from([0.0, 0.03, 0.06])
 
 
-def _draw_tilted(draw: DrawFn, faces: tuple[int, ...]) -> Case:
-    pairs = surface_pairs(same_domain=False, most=3, stretched=False, faces=faces, straight=True)
-    pair, layers, young, poisson = draw(pairs), draw(_BOTH_LAYERS), draw(_YOUNG), draw(_POISSON)
-    exponent, motion, seed = draw(solids.TILTED_STRAINS), draw(space_motions(furthest=16)), draw(samples.SEEDS)
-    slopes, stiff = draw(_SLOPES), draw(solids.STIFF)
-    strain = 2.0 ** -min(exponent, solids.SMALLEST_STRAIN.get(stiff, exponent))
-    return _scene(pair, layers, young, poisson, motion, strain=strain, slopes=slopes, stiff=stiff).case(seed=seed)
+def _tilted(
+    slopes: SearchStrategy[tuple[int, ...]],
+) -> Callable[[DrawFn, tuple[int, ...]], Case]:
+    def draw_case(draw: DrawFn, faces: tuple[int, ...]) -> Case:
+        pairs = surface_pairs(same_domain=False, most=3, stretched=False, faces=faces, straight=True)
+        pair, layers, young, poisson = draw(pairs), draw(_BOTH_LAYERS), draw(_YOUNG), draw(_POISSON)
+        exponent, motion, seed = draw(solids.TILTED_STRAINS), draw(space_motions(furthest=16)), draw(samples.SEEDS)
+        tilt, stiff, bump = draw(slopes), draw(solids.STIFF), draw(_BUMPS)
+        strain = 2.0 ** -min(exponent, solids.SMALLEST_STRAIN.get(stiff, exponent))
+        return _scene(pair, layers, young, poisson, motion, strain=strain, slopes=tilt, stiff=stiff, bump=bump).case(
+            seed=seed
+        )
+
+    return draw_case
 
 
 space_block_cases = _on_scene(_draw_blocks, "space_block_cases")
 space_variant_cases = _on_scene(_draw_variants, "space_variant_cases")
-space_solid_cases = _on_scene(_draw_tilted, "space_solid_cases", uniform=False)
+space_solid_cases = _on_scene(_tilted(_SLOPES), "space_solid_cases", uniform=False)
+space_closed_cases = _on_scene(_tilted(_CLOSED_SLOPES), "space_closed_cases", uniform=False)
 
 
 def _scene(
@@ -87,12 +98,18 @@ def _scene(
     *,
     strain: float = 0.0,
     pressure: float | None = None,
-    slopes: tuple[int, int] | None = None,
+    slopes: tuple[int, ...] | None = None,
+    bump: float = 0.0,
     stiff: float = MODERATE_PENALTY,
     rigid: bool = False,
 ) -> Scene:
     """Return the two blocks, pressed by an approach, or by a pressure: on a larger master no approach is uniform."""
     interface, plane, domain = pair.lay_out()
+    if slopes is not None:  # Off the lattice no slave node lies over a master edge.
+        plane = plane.copy()
+        plane[: interface.n_slave_nodes] += np.array([3 / 7, 5 / 11]) / 8
+        heights = bump * np.cos(2.5 * plane[:, 0]) * np.cos(2 * plane[:, 1])
+        interface = interface.at(np.column_stack([plane, heights]))
     approach = strain * (sum(layers[0]) + sum(layers[1]))
     if pressure is None and slopes is None and not pair.same_domain:
         pressure = strain * min(young)
@@ -107,7 +124,7 @@ def _scene(
         penalty=stiff * (young[0] if rigid else min(young)) / mean / motion.scale,
         pressure=pressure,
         approach=approach if pressure is None else None,
-        tilt=tuple(approach * slope / 13 for slope in slopes) if slopes else (0.0, 0.0),
+        tilt=(approach * slopes[0] / 13, approach * slopes[1] / 13) if slopes else (0.0, 0.0),
         rigid_master=rigid,
         motion=motion,
     )

@@ -12,6 +12,7 @@ import numpy as np
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case, Cases
 from contactverif.contract.formulation import ContactPoints
+from contactverif.contract.interface import PLANE
 from contactverif.contract.property import Measure, Measurement, Property, Quantity, check_all
 from contactverif.contract.subject import EngineSubject, Subject
 from contactverif.contract.traits import Traits
@@ -19,6 +20,7 @@ from contactverif.mechanics.accuracy import fit_rate, force_error, shape_integra
 from contactverif.problems.arcs import Arcs
 from contactverif.problems.hertz_boxes import HERTZ_STUDIES
 from contactverif.problems.problem import ITERATIONS, Bound, Errors, ProblemInstance, Studies
+from contactverif.problems.space_problems import HERTZ_CELLS, HERTZ_POINT, EggBox, egg_box_cases, hertz_point_cases
 from contactverif.problems.wavy import CURVED_STUDIES, WAVY_STUDIES
 from contactverif_properties import applicability
 from contactverif_properties.exact_forces import pushing_forces, uniform_state
@@ -83,7 +85,9 @@ def _solve(studies: Studies, instance: ProblemInstance, subject: Subject) -> tup
 
 
 def _exact_forces(studies: Studies, case: Case) -> FloatArray:
-    """Return the exact forces (n_nodes, 2) that push the nodes of the coarsest mesh, for pictures."""
+    """Return the exact forces (n_nodes, dim) that push the nodes of the coarsest mesh, for pictures."""
+    if case.interface.dim != PLANE:
+        return HERTZ_POINT.pose(HERTZ_CELLS, Traits()).exact_forces(case)
     study = studies.read(case)
     return study.pose(study.meshes[0], Traits()).exact_forces(case)
 
@@ -178,9 +182,29 @@ def accuracy_wavy_curved(case: Case, subject: Subject) -> Measurement:
     return _measure_convergence(CURVED_STUDIES, case, subject)
 
 
-@_define(HERTZ_STUDIES)(
+TOTAL = Quantity(
+    "total force on a point contact",
+    "0.08",
+    "Five cells on 1.2 a, springs of 10 E/h and a rigid body that is not a parabola; right ones have 0.04.",
+)
+NODES = Quantity("error of nodal forces on a point contact", "0.16", "The mesh is coarse; right ones have 0.10.")
+
+
+def _measure_point(case: Case, subject: Subject) -> Measurement:
+    instance = HERTZ_POINT.pose(HERTZ_CELLS, subject.traits)
+    solution = solve_for_accuracy(instance.scene, subject)
+    n_slave = solution.interface.n_slave_nodes
+    forces, exact = solution.forces[:n_slave], instance.exact_forces(solution.state)[:n_slave]
+    total = abs(float(forces[:, 2].sum() / exact[:, 2].sum()) - 1)
+    nodes = float(np.linalg.norm(forces - exact) / np.linalg.norm(exact))
+    undecided = "" if solution.balanced else _name_failures({HERTZ_CELLS: solution.end}, "Newton's method")
+    return Measurement(check_all({TOTAL: total, NODES: nodes}, {TOTAL: 0.08, NODES: 0.16}), undecided)
+
+
+@partial(_define(HERTZ_STUDIES), quantities=(*HERTZ_STUDIES.quantities, TOTAL, NODES))(
     id="accuracy.hertz",
     rank=520,
+    cases_in_space=Cases.from_list(hertz_point_cases),
     promise=lambda traits: traits.promises.converges,
     applicable=applicability.refuse_unknown_pressure,
 )
@@ -217,11 +241,17 @@ def accuracy_hertz(case: Case, subject: Subject) -> Measurement:
       it. The peak of F/m is right to P1 (0.4 P1 is measured), and displacements of the slave, which are smoother than
       pressures, to 1.5 P1 on the layer and to P1 elsewhere (0.6 and 0.34).
 
+    In space a rigid paraboloid is pressed into a quarter of a box of side 3a whose far sides move as Boussinesq's
+    half-space does, with five cells on 1.2 a and ε̂ = 10 E/h. The total force is right to 0.08, and the nodal forces to
+    0.16 in the mean square; right ones have 0.04 and 0.10.
+
     The trait `converges` is the promise. `docs/concepts/accuracy.md` has a picture.
 
     **Undecided.** A case in which Newton's method ends out of balance on some mesh, by more than 1e-4 of the largest
     force. It starts at the exact displacements, where nothing but the formulation's own kinks can keep it from ending.
     """
+    if case.interface.dim != PLANE:
+        return _measure_point(case, subject)
     return _measure_convergence(HERTZ_STUDIES, case, subject)
 
 
@@ -231,6 +261,80 @@ EXTRAPOLATED = 3e-5  # Right formulations reach 9.3e-6 here, and thirteen that s
 _SECOND_ORDER = (
     "Errors of second order are taken away by two meshes, (4 e₆₄ − e₃₂)/3. Right ones reach 9.3e-6, strangers too."
 )
+EGG_BOX = Quantity(
+    "extrapolated amplitude of the pressure",
+    "0.02",
+    "Errors of second order are taken away by two meshes, (4 e₂ − e₁)/3. Right ones reach 0.01.",
+)
+EGG_BOX_RATE = Quantity(
+    "rate of the amplitude",
+    "1.6",
+    "It is 2. Right ones have 1.8 and more, where the finer mesh errs by more than 0.01.",
+    sense="at least",
+)
+_SMALL_AMPLITUDE = 0.01  # An error of the finer mesh up to this has no rate that says anything.
+
+
+def _refuse_plane(traits: Traits) -> str:
+    if traits.abilities.in_plane:
+        return "the bodies are in space"
+    return applicability.refuse_dependent_multipliers(traits)
+
+
+def _egg_box_forces(case: Case) -> FloatArray:
+    return EggBox.from_case(case).pose(1, Traits()).exact_forces(case)
+
+
+@Property.define(
+    id="accuracy.egg-box",
+    rank=535,
+    quantities=(EGG_BOX, EGG_BOX_RATE),
+    cases=Cases.from_list(tuple),
+    cases_in_space=Cases.from_list(egg_box_cases),
+    promise=lambda traits: traits.promises.converges,
+    linear=applicability.LINEAR_FORCES,
+    applicable=_refuse_plane,
+    bodies=True,
+    engines=True,
+    exact=_egg_box_forces,
+)
+def accuracy_egg_box(case: Case, subject: Subject) -> Measurement:
+    """The pressure between blocks with an egg-box between them converges to the exact one.
+
+    **Question.** A block with the surface h cos(πx/w) cos(πy/l) is pressed on a flat one until all is in contact. Does
+    the amplitude of the pressure converge to the exact one, on hexahedra and on tetrahedra that do not match?
+
+    **Why it matters.** It is the simplest pressure in space that varies. A method that passes the patch test may give a
+    quadrilateral half of its force, or weigh the corners of a face wrongly where the pressure has a slope.
+
+    **How it is judged.** Meshes are 4r × 3r faces on 3r × 4r, r = 1 and 2, with ε̂ = 100 (E = 1000 and 300), and on
+    hexahedra with 1e4, too. The amplitude is Σ F_i cos cos over the slave's nodes, over the same sum of the exact nodal
+    forces. The exact one is h/(C + C + 1/ε̂) with the compliances C of layers on rollers. Its error is of second order:
+    (4 e₂ − e₁)/3 is at most 0.02, where 0.01 is measured. The rate is at least 1.6 where e₂ is above 0.01.
+
+    **Undecided.** Where Newton's method finds no solution on one of the meshes.
+
+    **Source.** K. L. Johnson, Contact Mechanics (1985), Chapter 13.
+    """
+    box, errors, ends = EggBox.from_case(case), [], {}
+    for refine in (1, 2):
+        instance = box.pose(refine, subject.traits)
+        solution = solve_for_accuracy(instance.scene, subject, instance.start, instance.step)
+        exact, n_slave = instance.exact_forces(solution.state), solution.interface.n_slave_nodes
+        wave = box.cosines(solution.interface.nodes[:n_slave])
+        ends[refine] = "" if solution.balanced else solution.end
+        amplitudes = (float(forces[:n_slave, 2] @ wave) for forces in (solution.forces, exact))
+        errors.append(next(amplitudes) / next(amplitudes) - 1)
+    solver = "the code" if isinstance(subject, EngineSubject) else "Newton's method"
+    coarse, fine = errors
+    numbers = [EGG_BOX.check(abs(4 * fine - coarse) / 3, 0.02)]
+    if abs(fine) > _SMALL_AMPLITUDE:
+        numbers.append(EGG_BOX_RATE.check(float(np.log2(abs(coarse / fine))), 1.6))
+    details = {"error at r = 1": coarse, "error at r = 2": fine}
+    measurement = Measurement(numbers, _name_failures(ends, solver), details=details)
+    return measurement.after("solved on this mesh and on one that is twice as fine")
+
+
 _CHORDS = "(h_s² + h_m²)/(8Rd)"
 _CHORD_REASON = "A chord h is up to h²/8R inside its arc, so that gaps differ from d by no more than both."
 SLAVE = Quantity("extrapolated radial force on the slave", f"{EXTRAPOLATED:g}", _SECOND_ORDER)

@@ -28,6 +28,7 @@ from contactverif.mechanics.newton import MAX_ITERATIONS, End, Trace, solve
 from contactverif.mechanics.scene import Scene, scene_of
 from contactverif.mechanics.system import ROUNDOFF_FACTOR, System
 from contactverif.strategies.solids import closed_cases, solid_cases
+from contactverif.strategies.space_solids import space_closed_cases, space_solid_cases
 from contactverif_properties import applicability
 from contactverif_properties.kinks import find_kink
 from contactverif_properties.roundoff import (
@@ -129,6 +130,7 @@ ORDER = Quantity(
 _define = partial(
     Property.define,
     cases=Cases.random(solid_cases),
+    cases_in_space=Cases.random(space_solid_cases),
     promise=applicability.promise_exact_tangent,
     needs=frozenset({"tangent"}),
     applicable=applicability.refuse_dependent_multipliers,
@@ -386,6 +388,7 @@ STEPS = Quantity(
     rank=570,
     quantities=(STEPS,),
     cases=Cases.random(solid_cases),
+    cases_in_space=Cases.random(space_solid_cases),
     linear=applicability.LINEAR_FORCES,
     applicable=applicability.refuse_unknown_pressure,
     bodies=True,
@@ -413,12 +416,12 @@ def newton_units(case: Case, subject: Subject) -> Measurement:
     k = int(random.integers(-LARGEST_LENGTH, LARGEST_LENGTH + 1))
     j = int(random.integers(-LARGEST_MODULUS, LARGEST_MODULUS + 1))
     length, modulus, penalty = 2.0**k, 4.0**j, subject.penalty(case)
-    distributed = subject.traits.rules.penalty == "distributed"
+    area = 1.0 if subject.traits.rules.penalty == "distributed" else length ** (scene.dim - 1)
     system = System(scene, subject.with_penalty(penalty))
-    rescaled = subject.with_penalty(penalty * modulus / (length if distributed else 1.0))
+    rescaled = subject.with_penalty(penalty * modulus / length * area)
     other = System(change_units(scene, length, modulus), rescaled)
     factors = np.full(system.size, length)
-    factors[scene.n_free :] = modulus * (1.0 if distributed else length)
+    factors[scene.n_free :] = modulus * area
 
     trace = solve(scene, system.formulation, iterations=ITERATIONS)
     differences, broken, undecided = [], "", ""
@@ -531,6 +534,7 @@ class _Attained(NamedTuple):
     rank=550,
     quantities=(ADDED, RESIDUAL, ERROR),
     cases=Cases.random(closed_cases),
+    cases_in_space=Cases.random(space_closed_cases),
     promise=lambda traits: traits.promises.translation_stable,
     applicable=applicability.refuse_dependent_multipliers,
     bodies=True,

@@ -11,16 +11,17 @@ import numpy as np
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray
 from contactverif.contract.case import Case, Cases
 from contactverif.contract.formulation import ContactPoints
-from contactverif.contract.interface import Interface
+from contactverif.contract.interface import PLANE, Interface
 from contactverif.contract.property import Measurement, Property, Quantity, check_all
 from contactverif.contract.subject import SOLVE, CheckedFormulation, EngineSubject, Subject
 from contactverif.contract.traits import Traits
 from contactverif.mechanics.accuracy import Solution, shape_integrals, solve_by_engine, solve_for_accuracy
 from contactverif.mechanics.newton import End, Trace, solve
-from contactverif.mechanics.scene import Scene
+from contactverif.mechanics.scene import Scene, scene_of
 from contactverif.problems.kinked_patch import KinkedPatch, exact_unknowns, kinked_patch, patch_of
 from contactverif.problems.problem import FORCES
 from contactverif.problems.shrink_fit import FIT, SEGMENTS, FiniteFit, RingStudy, Role, shrink_fit
+from contactverif.problems.space_problems import SHELLS, shell_cases
 from contactverif.problems.uniform_stress import uniform_forces
 from contactverif_properties.applicability import LINEAR_FORCES, refuse_dependent_multipliers, refuse_unknown_total
 from contactverif_properties.newton_method import end_details
@@ -53,6 +54,11 @@ BARE_NODES = Quantity(
     "A quarter has two ends, where a foot may lie just past the master's last node: a mortar method leaves out that "
     "segment with its two nodes. A mean hides what lacks.",
 )
+
+
+MOST_OF_MEAN, MOST_OF_NODES = 0.05, 0.12
+SHELL_MEAN = Quantity("error of the mean traction on a sphere", f"{MOST_OF_MEAN:g}", "Right ones have at most 0.03.")
+SHELL_NODES = Quantity("error of nodal tractions on a sphere", f"{MOST_OF_NODES:g}", "Right ones have at most 0.06.")
 
 
 @cache
@@ -98,8 +104,9 @@ def _promise_mean(traits: Traits) -> bool | None:
 @Property.define(
     id="patch.curved",
     rank=485,
-    quantities=(SLAVE_MEAN, MASTER_MEAN, REPORTED, BESIDE, BARE_NODES),
+    quantities=(SLAVE_MEAN, MASTER_MEAN, REPORTED, BESIDE, BARE_NODES, SHELL_MEAN, SHELL_NODES),
     cases=Cases.from_list(_rings),
+    cases_in_space=Cases.from_list(shell_cases),
     linear=LINEAR_FORCES,
     promise=_promise_mean,
     applicable=_refuse_unknown_mean,
@@ -139,11 +146,23 @@ def patch_curved(case: Case, subject: Subject) -> Measurement:
     A whole code is allowed 4e-3, as it has normals of its own. No more than the four nodes at the ends may have less
     than a tenth of their share: a search that loses pairs leaves the mean as it is, where others bear more.
 
+    In space two spherical shells are shrunk onto each other by δ = c/30, an octant with 8 faces along an edge of the
+    inner one on 6, at ε̂ c = E/2. The nodes of both surfaces lie a little outside of their spheres, so that facets
+    enclose the volume of the ball. The mean of radial forces over the slave's area is right to 0.05, and that of each
+    node, in the mean square, to 0.12; right ones have 0.03 and 0.06. Who fails there is judged on whole spheres, since
+    on an octant the foot of a node on a plane of symmetry may lie past the border.
+
     The total is known from the traits only if `penalty` is "distributed" and `area` is stated, or for multipliers that
     are independent. These formulations are asked to pass, but not multipliers that state `inf_sup=False`.
 
     **Undecided.** A case whose solution Newton's method does not find.
     """
+    if case.interface.dim != PLANE:
+        measurement = _measure_shells(scene_of(case), case, subject)
+        if measurement.undecided or all(number.ratio <= 1 for number in measurement.numbers):
+            return measurement
+        scene = SHELLS.scene(inner_slave=bool(case.parameter("inner_slave")), whole=True)
+        return _measure_shells(scene, case, subject).after("solved as whole spheres")
     study = RingStudy.from_case(case)
     coarser = len(case.interface.slave) // SEGMENTS[study.slave]
     measurement = _measure(study, coarser, subject, quarters=1)
@@ -153,6 +172,21 @@ def patch_curved(case: Case, subject: Subject) -> Measurement:
         return measurement  # The two segments at the ends bear no more than that.
     whole = _measure(study, coarser, subject, quarters=4)
     return replace(measurement, undecided=f"whole rings: {whole.undecided}") if whole.undecided else whole
+
+
+def _measure_shells(scene: Scene, case: Case, subject: Subject) -> Measurement:
+    """Solve both shells; return the errors of the mean radial force over the slave's area, and of that of each node."""
+    solution = solve_for_accuracy(scene, subject)
+    exact = SHELLS.traction(inner_slave=bool(case.parameter("inner_slave")), traits=subject.traits)
+    nodes, n_slave = scene.interface.nodes, scene.interface.n_slave_nodes
+    outwards = nodes[:n_slave] / np.linalg.norm(nodes[:n_slave], axis=1)[:, None]
+    radial = np.abs((solution.forces[:n_slave] * outwards).sum(axis=1))
+    areas = shape_integrals(scene.interface.slave, nodes)[:n_slave]
+    mean = abs(float(radial.sum() / areas.sum()) / exact - 1)
+    each = float(np.sqrt(np.mean((radial / areas / exact - 1) ** 2)))
+    undecided = "" if solution.balanced else f"no solution: {solution.end}"
+    values = {SHELL_MEAN: mean, SHELL_NODES: each}
+    return Measurement(check_all(values, {SHELL_MEAN: MOST_OF_MEAN, SHELL_NODES: MOST_OF_NODES}), undecided)
 
 
 def _measure(study: RingStudy, coarser: int, subject: Subject, quarters: Literal[1, 4]) -> Measurement:
