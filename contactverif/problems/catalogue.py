@@ -140,9 +140,9 @@ def load_scene_case(text: str) -> Case:
         return load_scene(text, "scene").case()
     state = named_case(text)
     plane, domain, layers = state.parameters["plane"], state.parameters["domain"], ([0.5, 0.5], [0.5, 0.5])
-    materials: dict[str, Any] = {"young": (1.0, 3.0), "poisson": (0.3, 0.2)}
+    materials = (1.0, 0.3), (3.0, 0.2)
     scene = space_blocks(
-        state.interface, plane, domain, layers=layers, **materials, penalty=MODERATE_PENALTY, approach=2.0**-6
+        state.interface, plane, domain, layers=layers, materials=materials, penalty=MODERATE_PENALTY, approach=2.0**-6
     )
     return replace(scene, name=text).case()
 

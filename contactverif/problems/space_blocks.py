@@ -2,11 +2,12 @@
 
 A block is its contact surface, extruded. Its sides cannot move sideways, so that the pressure of two blocks is uniform
 and known exactly, whatever the grids. Where the master is larger than the slave, the pressure also acts on its part
-beside the slave.
+beside the slave, and the other way round.
 """
 
 from collections.abc import Sequence
-from typing import Protocol
+from dataclasses import dataclass
+from math import ldexp
 
 import numpy as np
 
@@ -15,21 +16,43 @@ from contactverif.contract.body import Body
 from contactverif.contract.interface import TRIANGLE, Interface, Surface
 from contactverif.mechanics.scene import Scene
 from contactverif.oracle.flat_answers import uniform_surface_weights
+from contactverif.problems.flat_states import rotation
 
 
-class Motion(Protocol):
-    """A similarity of a drawing: it takes points (n, 3) to where they lie."""
+@dataclass(frozen=True, slots=True)
+class SpaceMotion:
+    """A similarity x → 2^k (Q x + shift). The rotation Q is that of a quaternion of integers.
 
-    @property
-    def axes(self) -> FloatArray:
-        """The unit vectors (3, 3) that the axes of the drawing become, as rows."""
+    A whole one leaves Q undivided, a matrix of integers that stretches too: so it rounds no point of a lattice.
+    """
+
+    quaternion: tuple[int, int, int, int] = (1, 0, 0, 0)
+    shift: tuple[int, int, int] = (0, 0, 0)  # In units of the lattice.
+    exponent: int = 0
+    whole: bool = False
 
     @property
     def scale(self) -> float:
-        """The factor of all lengths."""
+        """The factor of all lengths: 2^k, or an integer × 2^k."""
+        return ldexp(float(rotation(self.quaternion)[1] if self.whole else 1), self.exponent)
 
-    def __call__(self, points: FloatArray, /) -> FloatArray:
-        """Return the points, moved."""
+    @property
+    def axes(self) -> FloatArray:
+        """The unit vectors (3, 3) that the axes become, as rows."""
+        rows, size = rotation(self.quaternion)
+        return np.array(rows).T / size
+
+    @property
+    def normal(self) -> FloatArray:
+        """The unit vector (3,) that the z-axis becomes."""
+        return self.axes[2]
+
+    def __call__(self, points: FloatArray) -> FloatArray:
+        """Return the points (n, 3), moved; each coordinate is rounded once, from extended precision."""
+        rows, size = rotation(self.quaternion)
+        turned = points.astype(np.longdouble) @ np.array(rows, dtype=np.longdouble).T
+        moved = turned / np.longdouble(1 if self.whole else size) + np.array(self.shift, dtype=np.longdouble)
+        return (moved * ldexp(1.0, self.exponent)).astype(np.float64)
 
 
 def extrude(faces: IntArray, n_nodes: int, n_layers: int) -> IntArray:
@@ -57,14 +80,14 @@ def space_blocks(
     domain: FloatArray,
     *,
     layers: tuple[Sequence[float], Sequence[float]],
-    young: tuple[float, float],
-    poisson: tuple[float, float],
+    materials: tuple[tuple[float, float], tuple[float, float]],
     penalty: float,
     pressure: float | None = None,
     approach: float | None = None,
     tilt: tuple[float, float] = (0.0, 0.0),
     rigid_master: bool = False,
-    motion: Motion | None = None,
+    lowered: float | None = None,
+    motion: SpaceMotion = SpaceMotion(),
 ) -> Scene:
     """Return the scene of a slave block that is pressed down on a master block, or on a rigid floor.
 
@@ -75,16 +98,16 @@ def space_blocks(
     plane : FloatArray, shape (n_nodes, 2)
         The coordinates of its nodes in that plane.
     domain : FloatArray, shape (n_corners, 2)
-        The corners of what both surfaces cover, all of the slave.
+        The corners of what both surfaces cover.
     layers : tuple[Sequence[float], Sequence[float]]
         The heights of the layers of cells of slave and master, a length each.
-    young, poisson : tuple[float, float]
-        The materials of slave and master.
+    materials : tuple[tuple[float, float], tuple[float, float]]
+        Young's modulus and Poisson's ratio of slave and master.
     penalty : float
         The distributed stiffness ε̂, force per area per length of penetration.
     pressure : float | None
-        The pressure on top of the slave, force per area, and on what the master has beside it. Either this or
-        `approach` is given.
+        The pressure on top of the slave, force per area, and on what either surface has beside the other. Either this
+        or `approach` is given.
     approach : float | None
         The displacement of the top of the slave towards the master, a length.
     tilt : tuple[float, float]
@@ -92,7 +115,9 @@ def space_blocks(
         the domain. With a tilt no exact pressure is known.
     rigid_master : bool
         True replaces the master by its surface, held.
-    motion : Motion | None
+    lowered : float | None
+        The depth to which the slave is pushed in the first guess; `approach` by default, or pressure / ε̂.
+    motion : SpaceMotion
         The rotation, shift and scale of the drawing; lengths of all other arguments are those before it.
 
     Returns
@@ -101,15 +126,15 @@ def space_blocks(
         Its facts are "plane", "domain", "normal" (3,) out of the master, and, if the pressure is known exactly,
         "compliance" (2,) and "pressure" or "approach".
     """
-    n_slave, axes, scale = interface.n_slave_nodes, np.eye(3), 1.0
-    if motion is not None:
-        axes, scale = motion.axes, motion.scale
+    n_slave, axes, scale = interface.n_slave_nodes, motion.axes, motion.scale
     low, high = plane.min(axis=0), plane.max(axis=0)
     around = np.array([low, [high[0], low[1]], high, [low[0], high[1]]])
     whole, inside = (uniform_surface_weights(interface, plane, part) for part in (around, domain))
     places, heights = (np.split(part, [n_slave]) for part in (plane, interface.nodes[:, 2]))
-    bodies, compliances = [], []
-    middle, depth = domain.mean(axis=0), approach if approach is not None else (pressure or 0.0) / penalty / scale
+    bodies, compliances, middle = [], [], domain.mean(axis=0)
+    if lowered is None:
+        lowered = approach if approach is not None else (pressure or 0.0) / penalty / scale
+    beside = np.split((pressure or 0.0) * scale**2 * (whole - inside), [n_slave])
     for index, (surface, start) in enumerate(((interface.slave, 0), (interface.master, n_slave))):
         faces, flat, sign = surface.faces - start, places[index], (1.0, -1.0)[index]
         n, rigid = len(flat), bool(index and rigid_master)
@@ -123,22 +148,23 @@ def space_blocks(
             fixed[:] = True
         elif index:
             fixed[far, 2] = True
-            load[:n, 2] = -(pressure or 0.0) * scale**2 * (whole - inside)[n_slave:]
         elif approach is not None:
             fixed[far, 2], imposed[far, 2] = True, -(approach + (flat - middle) @ tilt) * scale
         else:
             load[far, 2] = -(pressure or 0.0) * scale**2 * whole[:n_slave]
+        if not rigid:
+            load[:n, 2] += sign * beside[index]
         body = Body(
-            nodes=nodes if motion is None else motion(nodes),
+            nodes=motion(nodes),
             cells=np.zeros((0, 8), np.int64) if rigid else extrude(faces, n, len(levels) - 1),
             contact=faces,
-            young=young[index],
-            poisson=poisson[index],
+            young=materials[index][0],
+            poisson=materials[index][1],
             fixed=fixed,
             imposed=imposed,
             load=load,
             axis=axes[:2],
-            start=np.array([0.0, 0.0, 0.0 if index else -depth * scale]),
+            start=np.array([0.0, 0.0, 0.0 if index else -lowered * scale]),
             name=("slave", "master")[index],
         )
         bodies.append(body)
@@ -148,6 +174,14 @@ def space_blocks(
         facts["compliance"] = np.array(compliances)
         facts |= {"approach": np.array(approach * scale)} if approach is not None else {"pressure": np.array(pressure)}
     return Scene(tuple(bodies), penalty=penalty, facts=facts)
+
+
+def rectangle(x: FloatArray, y: FloatArray, corners: int) -> tuple[FloatArray, IntArray]:
+    """Return the points (n, 2) of a grid and its faces, counter-clockwise in the plane."""
+    points = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2)
+    number = np.arange(len(points)).reshape(len(x), len(y))
+    faces = np.stack([number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]], axis=-1).reshape(-1, 4)
+    return points, np.vstack([faces[:, :3], faces[:, [0, 2, 3]]]) if corners == TRIANGLE else faces
 
 
 def _held_sides(surface: Surface, plane: FloatArray) -> BoolArray:

@@ -24,15 +24,7 @@ from contactverif.mechanics.changed_scenes import exchange_roles
 from contactverif.mechanics.scene import Scene
 from contactverif.problems.flat_states import collect_on_faces
 from contactverif.problems.problem import Problem, ProblemInstance, Variation
-from contactverif.problems.space_blocks import extrude, space_blocks
-
-
-def _rectangle(x: FloatArray, y: FloatArray, corners: int) -> tuple[FloatArray, IntArray]:
-    """Return the points (n, 2) of a grid and its faces, counter-clockwise in the plane."""
-    points = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2)
-    number = np.arange(len(points)).reshape(len(x), len(y))
-    faces = np.stack([number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]], axis=-1).reshape(-1, 4)
-    return points, np.vstack([faces[:, :3], faces[:, [0, 2, 3]]]) if corners == TRIANGLE else faces
+from contactverif.problems.space_blocks import extrude, rectangle, space_blocks
 
 
 def _oedometric_modulus(young: float, poisson: float) -> float:
@@ -212,7 +204,7 @@ def _egg_box(box: EggBox, refine: int, penalty: float) -> Scene:
     grids = []
     for counts in ((4 * refine, 3 * refine), (3 * refine, 4 * refine)):
         lines = (np.linspace(0.0, side, n + 1) for side, n in zip(box.sides, counts, strict=True))
-        grids.append(_rectangle(*lines, box.corners))
+        grids.append(rectangle(*lines, box.corners))
     (slave, below), (master, above) = grids
     nodes = [np.column_stack([points, np.zeros(len(points))]) for points in (slave, master)]
     nodes[0][:, 2] = -box.wave * box.cosines(nodes[0])
@@ -223,8 +215,9 @@ def _egg_box(box: EggBox, refine: int, penalty: float) -> Scene:
     corners = np.array([[0.0, 0.0], [box.sides[0], 0.0], box.sides, [0.0, box.sides[1]]])
     layers = tuple([height / (4 * refine)] * (4 * refine) for height in box.heights)
     scene = space_blocks(
-        interface, np.vstack([slave, master]), corners, layers=(layers[0], layers[1]), young=box.young,
-        poisson=box.poisson, penalty=box.stiffness, approach=approach,
+        interface, np.vstack([slave, master]), corners, layers=(layers[0], layers[1]),
+        materials=((box.young[0], box.poisson[0]), (box.young[1], box.poisson[1])), penalty=box.stiffness,
+        approach=approach,
     )  # fmt: skip
     return scene if box.upper_slave else exchange_roles(scene)
 
@@ -308,7 +301,7 @@ def _hertz_point(point: HertzPoint, cells: int) -> Scene:
         depths.append(depths[-1] + step)
         step *= ratio
     depth = np.array(depths) * side / depths[-1]
-    flat, faces = _rectangle(along, along, TRIANGLE)
+    flat, faces = rectangle(along, along, TRIANGLE)
     nodes = np.column_stack([np.tile(flat, (len(depth), 1)), np.repeat(-depth, len(flat))])
     far = (nodes[:, 0] == side) | (nodes[:, 1] == side) | (nodes[:, 2] == -side)
     fixed, imposed = far[:, None] | (nodes == 0) & [True, True, False], np.zeros(nodes.shape)
@@ -319,7 +312,7 @@ def _hertz_point(point: HertzPoint, cells: int) -> Scene:
         fixed=fixed, imposed=imposed, name="box",
     )  # fmt: skip
     n_master = int(cells * 5 / 3) + 1
-    places, below = _rectangle(*[np.linspace(-0.15, 1.45, n_master + 1)] * 2, TRIANGLE)
+    places, below = rectangle(*[np.linspace(-0.15, 1.45, n_master + 1)] * 2, TRIANGLE)
     heights = (places**2).sum(axis=1) / (2 * point.radius) - point.contact_radius**2 / point.radius
     points = np.column_stack([places, heights])
     rigid = Body(

@@ -12,9 +12,9 @@ from contactverif.contract.interface import TRIANGLE
 from contactverif.mechanics.scene import Scene, has_bodies
 from contactverif.problems.blocks import is_uniform
 from contactverif.problems.catalogue import MODERATE_PENALTY
-from contactverif.problems.space_blocks import space_blocks
+from contactverif.problems.space_blocks import SpaceMotion, space_blocks
 from contactverif.strategies import samples, solids
-from contactverif.strategies.surfaces import SpaceMotion, SurfacePair, space_motions, surface_pairs
+from contactverif.strategies.surfaces import SurfacePair, space_motions, surface_pairs
 
 VARIANTS = ("rigid master", "unequal materials", "punch")
 MOST_CELLS = 4  # Along each side of a block.
@@ -119,8 +119,7 @@ def _scene(
         plane,
         domain,
         layers=layers,
-        young=young,
-        poisson=poisson,
+        materials=((young[0], poisson[0]), (young[1], poisson[1])),
         penalty=stiff * (young[0] if rigid else min(young)) / mean / motion.scale,
         pressure=pressure,
         approach=approach if pressure is None else None,

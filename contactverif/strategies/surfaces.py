@@ -8,7 +8,6 @@ shrink to one square on one square, each cut in two, without any motion.
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cache
-from math import ldexp
 from typing import Self
 
 import numpy as np
@@ -18,46 +17,10 @@ from hypothesis.strategies import DrawFn, SearchStrategy
 from contactverif.contract.arrays import FloatArray, IntArray
 from contactverif.contract.case import Case, random_source
 from contactverif.contract.interface import TRIANGLE, Interface, Surface
-from contactverif.problems.flat_states import rotation
+from contactverif.problems.space_blocks import SpaceMotion
 from contactverif.strategies import samples
 from contactverif.strategies.given_interface import given_surface_states, least_height
 from contactverif.strategies.translations import FINENESS, FURTHEST
-
-
-@dataclass(frozen=True, slots=True)
-class SpaceMotion:
-    """A similarity x → 2^k (Q x + shift). The rotation Q is that of a quaternion of integers.
-
-    A whole one leaves Q undivided, a matrix of integers that stretches too: so it rounds no point of a lattice.
-    """
-
-    quaternion: tuple[int, int, int, int] = (1, 0, 0, 0)
-    shift: tuple[int, int, int] = (0, 0, 0)  # In units of the lattice.
-    exponent: int = 0
-    whole: bool = False
-
-    @property
-    def scale(self) -> float:
-        """The factor of all lengths: 2^k, or an integer × 2^k."""
-        return ldexp(float(rotation(self.quaternion)[1] if self.whole else 1), self.exponent)
-
-    @property
-    def axes(self) -> FloatArray:
-        """The unit vectors (3, 3) that the axes become, as rows."""
-        rows, size = rotation(self.quaternion)
-        return np.array(rows).T / size
-
-    @property
-    def normal(self) -> FloatArray:
-        """The unit vector (3,) that the z-axis becomes."""
-        return self.axes[2]
-
-    def __call__(self, points: FloatArray) -> FloatArray:
-        """Return the points (n, 3), moved; each coordinate is rounded once, from extended precision."""
-        rows, size = rotation(self.quaternion)
-        turned = points.astype(np.longdouble) @ np.array(rows, dtype=np.longdouble).T
-        moved = turned / np.longdouble(1 if self.whole else size) + np.array(self.shift, dtype=np.longdouble)
-        return (moved * ldexp(1.0, self.exponent)).astype(np.float64)
 
 
 @cache

@@ -32,7 +32,7 @@ from contactverif.mechanics.linear import RANK_ROUNDOFF, scale_factors
 from contactverif.mechanics.newton import solve
 from contactverif.mechanics.scene import Scene, has_bodies, scene_of
 from contactverif.mechanics.system import System
-from contactverif.problems import block_scenes, flat_states, hard_corner_states
+from contactverif.problems import block_scenes, flat_states, hard_corner_states, space_scenes
 from contactverif.problems.blocks import pressure_of
 from contactverif.problems.open_states import activation_distance
 from contactverif.problems.uniform_stress import CONDITION_TOLERANCE, condition_tolerance
@@ -533,7 +533,13 @@ def hard_c(case: Case, subject: Subject) -> Measurement:
     return _measure_patch(case, subject)
 
 
-@_define_patch(id="hard.contrast", rank=650, cases=Cases.from_list(block_scenes.contrast_scenes), engines=True)
+@_define_patch(
+    id="hard.contrast",
+    rank=650,
+    cases=Cases.from_list(block_scenes.contrast_scenes),
+    cases_in_space=Cases.from_list(space_scenes.contrast_space_scenes),
+    engines=True,
+)
 def hard_contrast(case: Case, subject: Subject) -> Measurement:
     """A uniform pressure stays uniform for any contrast of stiffness and mesh, whichever body is the slave.
 
@@ -575,7 +581,13 @@ def hard_short_segment(case: Case, subject: Subject) -> Measurement:
     return _measure_patch(case, subject)
 
 
-@_define_patch(id="hard.stiff", rank=630, cases=Cases.from_list(block_scenes.stiff_scenes), engines=True)
+@_define_patch(
+    id="hard.stiff",
+    rank=630,
+    cases=Cases.from_list(block_scenes.stiff_scenes),
+    cases_in_space=Cases.from_list(space_scenes.stiff_space_scenes),
+    engines=True,
+)
 def hard_stiff(case: Case, subject: Subject) -> Measurement:
     """Springs of ε̂h/E = 1e10 on bodies whose stiffness differs by 1e6 leave a uniform pressure uniform.
 
@@ -611,6 +623,7 @@ def _divide_by_share(quantity: Quantity) -> Quantity:
     rank=600,
     quantities=tuple(map(_divide_by_share, patch_solved.patch_dead_zone.quantities)),
     cases=Cases.from_list(block_scenes.vanishing_overlap_scenes),
+    cases_in_space=Cases.from_list(space_scenes.vanishing_space_scenes),
     promise=lambda traits: True if traits.promises.patch.overhang else None,
     exact=patch_solved.forces_to_draw,
     engines=True,
@@ -661,6 +674,8 @@ def hard_dead_zone(case: Case, subject: Subject) -> Measurement:
 
 def covered_share(case: Case) -> float:
     """Return the least share of a slave segment that the master covers, of those of which it covers something."""
+    if case.interface.dim != PLANE:
+        return case.parameter("share")
     slave, master = np.split(case.parameters["along"], [case.interface.n_slave_nodes])
     ends = np.sort(slave[case.interface.slave.segments], axis=1)
     covered = np.minimum(ends[:, 1], master.max()) - np.maximum(ends[:, 0], master.min())
@@ -695,6 +710,7 @@ def _check_unloaded(
     rank=690,
     quantities=(NO_STRESS, NO_FORCE),
     cases=Cases.from_list(block_scenes.unloaded_scenes),
+    cases_in_space=Cases.from_list(space_scenes.unloaded_space_scenes),
     promise=law_is_linear,
     linear=LINEAR_BEGINNING,
     applicable=refuse_dependent_multipliers,

@@ -17,6 +17,7 @@ from scipy import linalg
 from contactverif.contract.arrays import UNIT_ROUNDOFF, BoolArray, FloatArray, dense
 from contactverif.contract.case import Case, Cases
 from contactverif.contract.engine import EngineAnswer
+from contactverif.contract.interface import PLANE
 from contactverif.contract.property import Measurement, Property, Quantity, check_all
 from contactverif.contract.subject import CheckedFormulation, EngineSubject, Subject
 from contactverif.mechanics.accuracy import Solution, shape_integrals, solve_by_engine
@@ -509,8 +510,10 @@ def patch_dead_zone(case: Case, subject: Subject) -> Measurement:
     **Undecided.** Never, as in `patch.flat.solve`.
     """
     measurement = measure_once(case, subject)
-    slave, master = np.split(case.parameters["along"], [case.interface.n_slave_nodes])
-    covered = min(slave.max(), master.max()) - max(slave.min(), master.min())
-    ratio = float(np.ptp(slave) / covered)
+    if case.interface.dim == PLANE:
+        slave, master = np.split(case.parameters["along"], [case.interface.n_slave_nodes])
+        ratio = float(np.ptp(slave) / (min(slave.max(), master.max()) - max(slave.min(), master.min())))
+    else:
+        ratio = case.slave_measure / float(np.prod(np.ptp(case.parameters["domain"], axis=0)))
     numbers = [replace(number, tolerance=ratio * number.tolerance) for number in measurement.numbers]
     return replace(measurement, numbers=numbers)

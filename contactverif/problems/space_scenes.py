@@ -1,0 +1,93 @@
+"""Two blocks in space in lists: contrasts of stiffness and mesh, overlaps that vanish, and no load at all.
+
+They are the scenes of `block_scenes` over grids of rectangles, or of triangles. The pressure is uniform in all but the
+last.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from itertools import product
+from typing import Any
+
+import numpy as np
+
+from contactverif.contract.case import Case
+from contactverif.contract.interface import Interface
+from contactverif.mechanics.scene import Scene
+from contactverif.problems.catalogue import MODERATE_PENALTY
+from contactverif.problems.flat_states import collect_on_faces
+from contactverif.problems.space_blocks import SpaceMotion, rectangle, space_blocks
+
+Lines = Sequence[float]
+SIDE, _STRAIN = 12.0, 2.0**-6  # The side of a square, and the pressure over the softer body's E.
+_RATIOS = ("1e-6", "1", "1e6")  # E of the master over E of the slave.
+_INCLINED = SpaceMotion((4, 1, -2, 1), (1, -2, 3))
+_FINE, _COARSE = np.linspace(0.0, SIDE, 7).tolist(), [0.0, 7.0, SIDE]
+
+
+def _blocks(corners: int, slave: Lines, master: Lines, ratio: float, *, stiff: float, **others: Any) -> Scene:
+    """Return two blocks over grids with the same lines along both axes; ε̂ is in E/h of the softer body."""
+    (above, below), (under, upper) = (rectangle(*[np.array(lines)] * 2, corners) for lines in (slave, master))
+    flat = [np.column_stack([points, np.zeros(len(points))]) for points in (above, under)]
+    interface = Interface.from_faces(flat[0], below[:, ::-1], flat[1], upper)
+    low, high = max(slave[0], master[0]), min(slave[-1], master[-1])
+    penalty = stiff * min(1.0, ratio) * (len(slave) - 1) / (slave[-1] - slave[0])
+    load = {"pressure": _STRAIN * min(1.0, ratio)} if "approach" not in others else {}
+    return space_blocks(
+        interface,
+        np.vstack([above, under]),
+        np.array([[low, low], [high, low], [high, high], [low, high]]),
+        layers=([3.0, 3.0], [3.0, 3.0]),
+        materials=((1.0, 0.3), (ratio, 0.2)),
+        penalty=penalty,
+        **load | others,
+    )
+
+
+def _named(name: str, scene: Scene) -> Case:
+    return replace(scene, name=name).case()
+
+
+@collect_on_faces
+def stiff_space_scenes(corners: int) -> Iterator[Case]:
+    """Return blocks whose springs are up to 1e10 times as stiff as the softer one; E of the other is 1 to 1e6 times."""
+    for stiff, ratio in product(("1e4", "1e10"), _RATIOS):
+        scene = _blocks(corners, [0.0, 3.0, 8.0, SIDE], [0.0, 5.0, SIDE], float(ratio), stiff=float(stiff))
+        yield _named(f"ε̂h/E = {stiff}, E ratio {ratio}", scene)
+
+
+@collect_on_faces
+def contrast_space_scenes(corners: int) -> Iterator[Case]:
+    """Return a fine block and a coarse one, each as the slave, the stiffer one or the softer one, at two penalties."""
+    for (mesh, lines), ratio, (label, stiff) in product(
+        {"6 on 2": (_FINE, _COARSE), "2 on 6": (_COARSE, _FINE)}.items(),
+        _RATIOS,
+        (("10 E/h", MODERATE_PENALTY), ("1e5 E/h", 1e5)),
+    ):
+        yield _named(f"{mesh}, E ratio {ratio}, ε̂ = {label}", _blocks(corners, *lines, float(ratio), stiff=stiff))
+
+
+@collect_on_faces
+def vanishing_space_scenes(corners: int) -> Iterator[Case]:
+    """Return blocks whose master covers 1e-1 to 1e-12 of the width of the last slave faces, upright and inclined."""
+    for exponent, motion in product((1, 2, 4, 6, 9, 12), (SpaceMotion(), _INCLINED)):
+        share = 10.0**-exponent
+        scene = _blocks(
+            corners, [0.0, 2.0, 5.0, 8.0], [-1.0, 1.5, 3.0, 5 + 3 * share], 1.0, stiff=MODERATE_PENALTY, motion=motion
+        )
+        facts = {**scene.facts, "share": np.array(share)}
+        name = f"overlap 1e-{exponent}{', inclined' if motion is _INCLINED else ''}"
+        yield _named(name, replace(scene, facts=facts))
+
+
+@collect_on_faces
+def unloaded_space_scenes(corners: int) -> Iterator[Case]:
+    """Return blocks that touch with no load, started in touch, pushed in or lifted, upright and inclined."""
+    slave, master = [0.0, 2.0, 4.0, 8.0, SIDE], [0.0, 3.0, 6.0, 9.0, SIDE]
+    for (start, lowered), (label, motion), (way, load) in product(
+        {"touching": 0.0, "pushed in": 2.0**-4, "lifted": -(2.0**-4)}.items(),
+        {"": SpaceMotion(), ", inclined": _INCLINED}.items(),
+        {"free": "pressure", "held": "approach"}.items(),
+    ):
+        others: dict[str, Any] = {load: 0.0, "lowered": lowered, "motion": motion}
+        yield _named(f"{way}, {start}{label}", _blocks(corners, slave, master, 3.0, stiff=MODERATE_PENALTY, **others))
