@@ -7,14 +7,15 @@ import numpy as np
 from hypothesis import strategies as st
 from hypothesis.strategies import DrawFn, SearchStrategy
 
+from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case, random_source
-from contactverif.contract.interface import TRIANGLE
+from contactverif.contract.interface import TRIANGLE, Interface
 from contactverif.mechanics.scene import Scene, has_bodies
 from contactverif.problems.blocks import is_uniform
 from contactverif.problems.catalogue import MODERATE_PENALTY
 from contactverif.problems.space_blocks import SpaceMotion, space_blocks
 from contactverif.strategies import samples, solids
-from contactverif.strategies.surfaces import SurfacePair, space_motions, surface_pairs
+from contactverif.strategies.surfaces import SurfacePair, matched_pairs, space_motions, surface_grids, surface_pairs
 
 VARIANTS = ("rigid master", "unequal materials", "punch")
 MOST_CELLS = 4  # Along each side of a block.
@@ -39,23 +40,51 @@ def _on_scene(
 
 
 def _draw_blocks(draw: DrawFn, faces: tuple[int, ...]) -> Case:
-    pair = draw(surface_pairs(most=MOST_CELLS, stretched=False, faces=faces, straight=True))
+    return _press(draw, surface_pairs(most=MOST_CELLS, stretched=False, faces=faces, straight=True))
+
+
+def _draw_matched(draw: DrawFn, faces: tuple[int, ...]) -> Case:
+    return _press(draw, matched_pairs(faces, stretched=False))
+
+
+def _press(draw: DrawFn, pairs: SearchStrategy[SurfacePair]) -> Case:
+    pair, layers, young, poisson = draw(pairs), draw(_BOTH_LAYERS), draw(_YOUNG), draw(_POISSON)
+    strain, motion, seed = draw(solids.STRAINS), draw(space_motions(furthest=16)), draw(samples.SEEDS)
+    return _scene(pair.lay_out(), layers, young, poisson, motion, strain=strain).case(seed=seed)
+
+
+_ENDS = st.tuples(*[st.integers(1, 13)] * 2)  # Fourteenths of the slave's side at which the master begins and ends.
+
+
+def _draw_dead_zones(draw: DrawFn, faces: tuple[int, ...]) -> Case:
+    grids = surface_grids(most=MOST_CELLS, faces=faces, straight=True)
+    slave, master, sides = draw(grids), draw(grids), np.array([draw(_ENDS), draw(_ENDS)]) / 14
     layers, young, poisson = draw(_BOTH_LAYERS), draw(_YOUNG), draw(_POISSON)
     strain, motion, seed = draw(solids.STRAINS), draw(space_motions(furthest=16)), draw(samples.SEEDS)
-    return _scene(pair, layers, young, poisson, motion, strain=strain).case(seed=seed)
+    low, high = sides.min(axis=1), np.maximum(sides.max(axis=1), sides.min(axis=1) + 1 / 14)
+    high[0] += 1 if seed % 2 else 0  # The master goes beyond the slave on one side.
+    plane = [slave.points(), samples.on_lattice(low + master.points() * (high - low))]
+    nodes = [np.column_stack([points, np.zeros(len(points))]) for points in plane]
+    interface = Interface.from_faces(nodes[0], slave.faces()[:, ::-1], nodes[1], master.faces())
+    ends = [plane[1].min(axis=0), np.minimum(plane[1].max(axis=0), 1.0)]
+    domain = np.array([[ends[i][0], ends[j][1]] for i, j in ((0, 0), (1, 0), (1, 1), (0, 1))])
+    laid_out, pressure = (interface, np.vstack(plane), domain), strain * min(young)
+    return _scene(laid_out, layers, young, poisson, motion, pressure=pressure).case(seed=seed)
 
 
 def _draw_variants(draw: DrawFn, faces: tuple[int, ...]) -> Case:
     variant = draw(_VARIANTS)
     name = VARIANTS[variant]
     pairs = surface_pairs(
-        same_domain=name != "punch", most=MOST_CELLS, stretched=name == "punch", faces=faces, straight=True
+        same_domain=name != "punch", most=MOST_CELLS, stretched=False, faces=faces, straight=True
     )
     pair, layers, poisson = draw(pairs), draw(_BOTH_LAYERS), draw(_POISSON)
     ratio = 10.0 ** draw(_CONTRASTS) if name == "unequal materials" else 1.0
     strain, motion, seed = draw(solids.STRAINS), draw(space_motions(furthest=16)), draw(samples.SEEDS)
     pressure = strain * min(1.0, ratio)
-    scene = _scene(pair, layers, (1.0, ratio), poisson, motion, pressure=pressure, rigid=name == "rigid master")
+    scene = _scene(
+        pair.lay_out(), layers, (1.0, ratio), poisson, motion, pressure=pressure, rigid=name == "rigid master"
+    )
     return replace(scene, facts={**scene.facts, "variant": np.array(float(variant))}).case(seed=seed)
 
 
@@ -76,21 +105,23 @@ def _tilted(
         exponent, motion, seed = draw(solids.TILTED_STRAINS), draw(space_motions(furthest=16)), draw(samples.SEEDS)
         tilt, stiff, bump = draw(slopes), draw(solids.STIFF), draw(_BUMPS)
         strain = 2.0 ** -min(exponent, solids.SMALLEST_STRAIN.get(stiff, exponent))
-        return _scene(pair, layers, young, poisson, motion, strain=strain, slopes=tilt, stiff=stiff, bump=bump).case(
-            seed=seed
-        )
+        return _scene(
+            pair.lay_out(), layers, young, poisson, motion, strain=strain, slopes=tilt, stiff=stiff, bump=bump
+        ).case(seed=seed)
 
     return draw_case
 
 
 space_block_cases = _on_scene(_draw_blocks, "space_block_cases")
+space_matched_cases = _on_scene(_draw_matched, "space_matched_cases")
+space_dead_zone_cases = _on_scene(_draw_dead_zones, "space_dead_zone_cases")
 space_variant_cases = _on_scene(_draw_variants, "space_variant_cases")
 space_solid_cases = _on_scene(_tilted(_SLOPES), "space_solid_cases", uniform=False)
 space_closed_cases = _on_scene(_tilted(_CLOSED_SLOPES), "space_closed_cases", uniform=False)
 
 
 def _scene(
-    pair: SurfacePair,
+    laid_out: tuple[Interface, FloatArray, FloatArray],
     layers: tuple[list[float], list[float]],
     young: tuple[float, float],
     poisson: tuple[float, float],
@@ -104,14 +135,14 @@ def _scene(
     rigid: bool = False,
 ) -> Scene:
     """Return the two blocks, pressed by an approach, or by a pressure: on a larger master no approach is uniform."""
-    interface, plane, domain = pair.lay_out()
+    interface, plane, domain = laid_out
     if slopes is not None:  # Off the lattice no slave node lies over a master edge.
         plane = plane.copy()
         plane[: interface.n_slave_nodes] += np.array([3 / 7, 5 / 11]) / 8
         heights = bump * np.cos(2.5 * plane[:, 0]) * np.cos(2 * plane[:, 1])
         interface = interface.at(np.column_stack([plane, heights]))
     approach = strain * (sum(layers[0]) + sum(layers[1]))
-    if pressure is None and slopes is None and not pair.same_domain:
+    if pressure is None and slopes is None and (np.abs(plane) > np.abs(domain).max(axis=0)).any():
         pressure = strain * min(young)
     mean = float(interface.slave.measures(interface.nodes).mean()) ** 0.5
     return space_blocks(

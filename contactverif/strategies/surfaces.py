@@ -186,12 +186,14 @@ def surface_pairs(
 
 
 @cache
-def _matched_pairs(faces: tuple[int, ...]) -> SearchStrategy[SurfacePair]:
+def matched_pairs(faces: tuple[int, ...], *, stretched: bool = True) -> SearchStrategy[SurfacePair]:
+    """Return pairs in which each master node over the slave lies on a slave node."""
+
     def pair(grid: SurfaceGrid, larger: bool, stretch: int, number: int) -> SurfacePair:
         return SurfacePair(grid, grid.with_ring() if larger else grid, not larger, 0, stretch, number, matched=True)
 
     grids = surface_grids(faces=faces, straight=True)
-    return st.builds(pair, grids, st.booleans(), _STRETCHES, samples.SHUFFLES)
+    return st.builds(pair, grids, st.booleans(), _STRETCHES if stretched else st.just(0), samples.SHUFFLES)
 
 
 _QUARTERS = st.integers(1, 8)  # The penetration of the middle, in quarters of a unit of the least height of a face.
@@ -214,7 +216,7 @@ def flat_surface_cases(draw: DrawFn, faces: tuple[int, ...] = (TRIANGLE,)) -> Ca
 @samples.on_own_meshes
 def matched_surface_cases(draw: DrawFn, faces: tuple[int, ...] = (TRIANGLE,)) -> Case:
     """Return cases as `flat_surface_cases` does, with each master node over the slave on a slave node."""
-    return _penetrate_uniformly(draw, _matched_pairs(faces))
+    return _penetrate_uniformly(draw, matched_pairs(faces))
 
 
 @random_source("contactverif.strategies.surfaces.uniform_surfaces.overhung_surface_cases")
