@@ -115,13 +115,19 @@ def draw(
 def _judge_and_draw(example: Counterexample, subject: Subject, files: OutputFiles) -> Outcome:
     question = registry.the_property(example.property_id)
     outcome = judge_if_applicable(question, example.case, subject)
-    for path in files.paths.values():
-        draw_outcome(subject, question, outcome, path, argument="--out")
+    for suffix, path in files.paths.items():
+        if suffix == PARAVIEW and has_bodies(example.case):
+            solved = solve_scene(example.case, [subject])
+            if not solved.solutions:
+                raise MisuseError("--out", f"no solution ({solved.failures[subject.name]})", "a .png or .svg file")
+            write_vtu(solved, solved.solutions[0], path)
+        else:
+            draw_outcome(subject, question, outcome, path, argument="--out")
     return outcome
 
 
 def _check_surfaces(case: Case, files: OutputFiles) -> None:
-    if case.interface.dim == PLANE and PARAVIEW in files.names:
+    if case.interface.dim == PLANE and PARAVIEW in files.names and not has_bodies(case):
         raise MisuseError("--out", f"{files.names[PARAVIEW]} for a case without bodies", "a .png or .svg file")
 
 

@@ -14,7 +14,7 @@ from contactverif.contract.arrays import FloatArray
 from contactverif.contract.body import Body
 from contactverif.contract.case import Case
 from contactverif.mechanics.bodies import UPRIGHT, Placing, Rectangle, block, rigid_surface
-from contactverif.mechanics.scene import Scene
+from contactverif.mechanics.scene import Scene, scene_of
 
 
 def two_blocks(
@@ -134,6 +134,14 @@ def pressure_of(case: Case, penalty: float) -> float:
     if "pressure" in case.parameters:
         return case.parameter("pressure")
     return case.parameter("approach") / (float(case.parameters["compliance"].sum()) + 1 / penalty)
+
+
+def at_exact_solution(case: Case) -> Case:
+    """Return a case of a uniform scene at its exact solution, where forces are the exact ones; any other as it is."""
+    if not is_uniform(case):
+        return case
+    scene = scene_of(case)
+    return replace(case, z=scene.positions(exact_unknowns(scene, pressure_of(case, case.penalty), case.penalty)))
 
 
 def exact_unknowns(scene: Scene, pressure: float, penalty: float) -> FloatArray:

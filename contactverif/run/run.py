@@ -21,7 +21,7 @@ from typing import Literal, TypeVar, get_args
 from contactverif.contract.case import Case
 from contactverif.contract.counterexample import counterexample_of
 from contactverif.contract.errors import MisuseError
-from contactverif.contract.interface import SEGMENT, Interface
+from contactverif.contract.interface import PLANE, SEGMENT, Interface
 from contactverif.contract.property import LAST_TURN, Outcome, Property, Verdict
 from contactverif.contract.result import OPPOSITE_SIGN, NodalForces, NotLoaded, Result, Row, Run
 from contactverif.contract.subject import OPTIONAL_PARTS, EngineSubject, Subject
@@ -554,7 +554,10 @@ class Driver:
     def _measure_forces(self) -> Iterator[Job]:
         for row in self._open_rows():
             outcome = counterexample_of(row.row)
-            if outcome is not None and not outcome.case.packed_bodies and outcome.verdict is Verdict.FAIL:
+            if outcome is None or outcome.verdict is not Verdict.FAIL:
+                continue
+            # Bodies in the plane are drawn without forces.
+            if outcome.case.interface.dim != PLANE or not outcome.case.packed_bodies:
                 arguments = row.question, outcome.case, row.subject
                 yield Job(judge.forces_to_draw, arguments, partial(self._add_forces, row))
 

@@ -11,13 +11,14 @@ from contactverif.contract.arrays import FloatArray
 from contactverif.contract.body import Body
 from contactverif.contract.case import Case
 from contactverif.contract.errors import ContractError
+from contactverif.contract.interface import PLANE
 from contactverif.contract.result import NotLoaded
 from contactverif.contract.subject import CheckedFormulation, Subject
 from contactverif.mechanics.newton import End, Trace, solve
 from contactverif.mechanics.scene import Scene, scene_of
 from contactverif.problems.blocks import is_uniform, pressure_of
 from contactverif.problems.uniform_stress import stress_error
-from contactverif_reports.plot.solved_scene import PointPressures, Solution, SolvedScene
+from contactverif_reports.plot.solved_scene import STRESSES, PointPressures, Solution, SolvedScene, as_tensors
 
 _FAR = 1e3  # An iterate is not drawn if a displacement exceeds this multiple of the size of the scene.
 
@@ -94,13 +95,17 @@ def _last_to_be_drawn(trace: Trace) -> int:
 def _contact(
     scene: Scene, subject: Subject, formulation: CheckedFormulation, z: FloatArray
 ) -> tuple[FloatArray, PointPressures | None, str]:
-    """Return forces (n_nodes, 2), the pressures at points if there are any, and the plugin's error if it raises one."""
+    """Return forces (n_nodes, dim), the pressures at points if there are any, and the error of the plugin, if any."""
     interface = scene.interface
     forces: FloatArray = np.full(interface.nodes.shape, np.nan)
     try:
         pairing = formulation.pair(interface, z)
-        forces = -formulation.residual(interface, pairing, z)[: interface.n_unknowns].reshape(-1, 2)
-        if "contact_points" not in formulation.provides or subject.traits.rules.penalty == "nodal":
+        forces = -formulation.residual(interface, pairing, z)[: interface.n_unknowns].reshape(forces.shape)
+        if (
+            interface.dim != PLANE
+            or "contact_points" not in formulation.provides
+            or subject.traits.rules.penalty == "nodal"
+        ):
             return forces, None, ""
         points = formulation.contact_points(interface, pairing, z)
     except ContractError as error:
@@ -114,9 +119,7 @@ def _contact(
 
 
 def _in_global_axes(body: Body, stresses: FloatArray) -> FloatArray:
-    """Return means (n_cells, 3) of xx, yy and xy, from stresses (n_cells, n_points, 3) in the body's axes."""
-    means = stresses.mean(axis=1) if len(stresses) else np.zeros((0, 3))
-    along, across, shear = means.T
-    tensors = np.stack([along, shear, shear, across], axis=-1).reshape(-1, 2, 2)
-    rotated = body.frame @ tensors @ body.frame.T
-    return np.column_stack([rotated[:, 0, 0], rotated[:, 1, 1], rotated[:, 0, 1]])
+    """Return means (n_cells, 3 or 6) over the Gauss points of stresses (n_cells, n_points, 3 or 6) in its axes."""
+    means = stresses.mean(axis=1) if len(stresses) else np.zeros((0, len(STRESSES[body.dim])))
+    rotated = body.frame @ as_tensors(means) @ body.frame.T
+    return np.column_stack([rotated[:, i, j] for i, j in STRESSES[body.dim].values()])

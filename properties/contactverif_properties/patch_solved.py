@@ -18,7 +18,7 @@ from contactverif.contract.arrays import UNIT_ROUNDOFF, BoolArray, FloatArray, d
 from contactverif.contract.case import Case, Cases
 from contactverif.contract.engine import EngineAnswer
 from contactverif.contract.interface import PLANE
-from contactverif.contract.property import Measurement, Property, Quantity, check_all
+from contactverif.contract.property import Finding, Measurement, Property, Quantity, check_all
 from contactverif.contract.subject import CheckedFormulation, EngineSubject, Subject
 from contactverif.mechanics.accuracy import Solution, shape_integrals, solve_by_engine
 from contactverif.mechanics.linear import RANK_ROUNDOFF
@@ -201,7 +201,7 @@ def measure_at_penalty(case: Case, subject: Subject, penalty: float) -> Measurem
     # A state that is not Newton's last iterate has a pairing of its own.
     is_last = np.array_equal(state.z, trace.z)
     contact = FrozenState(formulation, state, trace.pairing if is_last else formulation.pair(case.interface, state.z))
-    values = _errors(contact, scene, q, pressure)
+    values, worst = _errors(contact, scene, q, pressure)
     values[GAP] = exact_forces.gap_error(state, pressure / penalty, pressure / penalty)
     if contact.has_points:
         gap, reported = exact_forces.point_errors(contact, penalty, pressure)
@@ -210,20 +210,25 @@ def measure_at_penalty(case: Case, subject: Subject, penalty: float) -> Measurem
             values[PRESSURE] = reported
     roundoff = uniform_tolerances(replace(state, penalty=stiffness), scene, pressure)
     tolerances = _tolerances(case, penalty, roundoff.stress) | {PRESSURE: roundoff.pressure}
-    return Measurement(check_all(values, tolerances), details=end_details(trace))
+    return Measurement(check_all(values, tolerances), details=end_details(trace)).after("", finding=worst)
 
 
-def _errors(state: FrozenState, scene: Scene, q: FloatArray, pressure: float) -> dict[Quantity, float]:
-    """Return the errors of stresses and forces in the state at the unknowns q (n_free,).
+def _errors(
+    state: FrozenState, scene: Scene, q: FloatArray, pressure: float
+) -> tuple[dict[Quantity, float], Finding | None]:
+    """Return the errors of stresses and forces in the state at the unknowns q (n_free,), and the worst force.
 
     Forces are judged twice: those that the bodies need to be in balance, and those that the formulation gives. They
     differ where the formulation found no balance, and at rollers, which take what the bodies do not need.
     """
     by_contact, exact = -state.forces, exact_forces.consistent_forces(state.case, pressure)
     by_bodies = np.where(_rigid_nodes(scene)[:, None], by_contact, scene.nodal_forces(q))
-    errors = np.maximum(*(np.linalg.norm(forces - exact, axis=1) for forces in (by_bodies, by_contact)))
-    slave, master = _by_side(state.case, errors, pressure)
-    return {STRESS: stress_error(scene, scene.stresses(q), pressure), SLAVE_FORCES: slave, MASTER_FORCES: master}
+    sizes = [np.linalg.norm(forces - exact, axis=1) for forces in (by_bodies, by_contact)]
+    slave, master = _by_side(state.case, np.maximum(*sizes), pressure)
+    worst = by_bodies if sizes[0].max() >= sizes[1].max() else by_contact
+    finding = exact_forces.worst_force(state.case.interface, worst, exact) if (worst != exact).any() else None
+    values = {STRESS: stress_error(scene, scene.stresses(q), pressure), SLAVE_FORCES: slave, MASTER_FORCES: master}
+    return values, finding
 
 
 def _tolerances(case: Case, penalty: float, tolerance: float) -> dict[Quantity, float]:
@@ -251,7 +256,7 @@ def _measure_with_multipliers(case: Case, subject: Subject) -> Measurement:
         state = replace(case, z=scene.positions(q)).with_multipliers(u[scene.n_free :])
         nearest, sharpness = _nearest_multipliers(state, scene, formulation, multipliers)
         state = state.with_multipliers(nearest)
-        values = _errors(FrozenState.at(formulation, state), scene, q, pressure)
+        values, worst = _errors(FrozenState.at(formulation, state), scene, q, pressure)
         values[GAP] = exact_forces.gap_error(state, 0.0, pressure / penalty)
         tolerance = uniform_tolerances(state, scene, pressure).stress
         tolerances = _tolerances(case, penalty, tolerance)
@@ -259,7 +264,7 @@ def _measure_with_multipliers(case: Case, subject: Subject) -> Measurement:
             loaded = multipliers != 0  # The multiplier of a node that faces nothing is 0.
             values[MULTIPLIERS] = float(np.abs(nearest[loaded] / pressure - 1).max(initial=0.0))
             tolerances[MULTIPLIERS] = tolerance / sharpness
-        return Measurement(check_all(values, tolerances))
+        return Measurement(check_all(values, tolerances)).after("", finding=worst)
 
     trace, u = _solve_patch(scene, formulation, exact, pressure / penalty)
     measurement = measure_errors(u)
@@ -354,6 +359,7 @@ def measure_two_penalties(case: Case, subject: Subject) -> Measurement:
         [*moderate.numbers, *(replace(number, quantity=_at_high(number.quantity)) for number in high.numbers)],
         undecided=moderate.undecided or high.undecided,
         details={**moderate.details, **{name + AT_HIGH: value for name, value in high.details.items()}, SLOPE: slope},
+        finding=moderate.finding or high.finding,
     ).after(f"solved at ε̂ = {case.penalty:.4g} and {HIGH * case.penalty:.4g}")
 
 

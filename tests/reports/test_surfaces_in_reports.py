@@ -14,18 +14,21 @@ from contactverif import Case, Interface, Run, judge_case, named_case
 from contactverif.api.report import make_drawing
 from contactverif.contract.counterexample import counterexamples
 from contactverif.contract.result import NodalForces
+from contactverif.problems.space_scenes import vanishing_space_scenes
 from contactverif.run.judge import forces_to_draw
 from contactverif.run.run import run
 from contactverif.sampling.draw import draw_cases
 from contactverif.strategies.surfaces import flat_surface_cases
+from contactverif.studies.solved_scenes import solve_scene
 from contactverif_reports.exchange.run_document import document_of
 from contactverif_reports.html.report_page import report_page
 from contactverif_reports.netcdf.read import case_ids, read_case, read_run
-from contactverif_reports.netcdf.stored_outcomes import counterexample_groups, read_forces
+from contactverif_reports.netcdf.stored_outcomes import check_bodies, counterexample_groups, read_forces
 from contactverif_reports.netcdf.write import write
 from contactverif_reports.plot.case_figures import make_case_figure, plot_case, view_from_above, widen
+from contactverif_reports.plot.scene_figures import plot_scene
 from contactverif_reports.plot.text import as_text
-from contactverif_reports.plot.vtu import write_surfaces
+from contactverif_reports.plot.vtu import write_surfaces, write_vtu
 
 CROSSED = named_case("crossed-diagonals")
 
@@ -139,10 +142,10 @@ def test_the_page_shows_forces_in_the_plane_too() -> None:
 
 
 def test_the_page_lists_properties_that_do_not_apply_by_their_reason() -> None:
-    properties = [load_property(id_) for id_ in ("balance.force", "hard.c", "patch.curved")]
+    properties = [load_property(id_) for id_ in ("balance.force", "hard.c", "accuracy.wavy")]
     page = report_page(run([load_subject("nts-3d")], properties, examples=1, seed=1), "report.nc")
     assert "2 properties do not apply</summary>" in page
-    assert "the interfaces are plane, and the formulation takes none of them: hard.c, patch.curved</li>" in page
+    assert "the interfaces are plane, and the formulation takes none of them: hard.c, accuracy.wavy</li>" in page
     assert "1 pass, 2 not applicable" in page
     assert "<dt" in page[page.index("The properties") :]
     assert "Case C" not in page
@@ -198,3 +201,65 @@ def test_the_document_of_a_run_lists_faces(failing_run: Run) -> None:
     assert row.counterexample is not None
     assert all(len(face) == 3 for face in row.counterexample.master)
     assert "in space" in row.counterexample.drawing
+
+
+@pytest.fixture(scope="module")
+def solved_run() -> Run:
+    return run([load_subject("nts-3d")], [load_property("patch.flat.solve")], examples=2, seed=1)
+
+
+def test_two_blocks_are_stored_told_and_drawn(solved_run: Run, tmp_path: Path) -> None:
+    (example,) = counterexamples(solved_run).values()
+    write(solved_run, tmp_path / "r.nc")
+    (id_,) = case_ids(tmp_path / "r.nc")
+    assert same_case(read_case(tmp_path / "r.nc", id_).case, example.case)
+    lines = as_text(example.case).splitlines()
+    assert "  slave: 12 tetrahedra in layers of 1/2, 1/2, E 1, ν 0.3" in lines
+    assert lines[-1] == "penalty 10   approach 1/64   seed 0"
+    finding = example.outcome.measurement and example.outcome.measurement.finding
+    assert "slave node 1 (border): force 0.0390625, exact 0.002278645833" in str(finding)
+    page = report_page(read_run(tmp_path / "r.nc"), tmp_path / "r.nc")
+    assert page == report_page(solved_run, tmp_path / "r.nc")
+    for words in ("the bodies, slave darker", "forces at the exact solution", "0.25 of the largest exact force"):
+        assert words in page
+
+
+def test_forces_of_blocks_are_compared_at_the_exact_solution(solved_run: Run) -> None:
+    """The first guess of an approach is deeper, so a right formulation would look wrong there."""
+    (example,) = counterexamples(solved_run).values()
+    forces = forces_to_draw(load_property("patch.flat.solve"), example.case, load_subject("sts-3d"))
+    assert forces is not None
+    assert forces.of_formulation == pytest.approx(forces.exact, abs=1e-15)
+
+
+@pytest.mark.parametrize(("faces", "kind"), [(3, "tetra"), (4, "hexahedron")])
+def test_a_solution_of_two_blocks_is_drawn_and_written(faces: int, kind: str, tmp_path: Path) -> None:
+    case = next(case for case in vanishing_space_scenes((faces,)) if "inclined" in case.name)
+    solved = solve_scene(case, [load_subject("sts-3d"), load_subject("mortar-3d")])
+    (solution, _), (upper, lower) = solved.solutions, solved.bodies
+    assert solution.stress_error < 1e-9
+    plot_scene(solved, tmp_path / "a.svg", title="two blocks")
+    text = (tmp_path / "a.svg").read_text(encoding="utf-8")
+    assert all(words in text for words in ("mortar-3d: converged", "nodal force over its share", "exact pressure"))
+    write_vtu(solved, solution, tmp_path / "a.vtu")
+    mesh = meshlane.read(tmp_path / "a.vtu")
+    assert {block.type: len(block.data) for block in mesh.cells} == {kind: len(upper.cells) + len(lower.cells)}
+    np.testing.assert_array_equal(mesh.point_data["displacement"], np.vstack(solution.displacements))
+    forces = mesh.point_data["contact_force"]
+    assert np.linalg.norm(forces[: len(upper.nodes)].sum(axis=0)) > 0
+    assert forces.sum(axis=0) == pytest.approx(0, abs=1e-12 * np.abs(forces).max())
+    np.testing.assert_allclose(mesh.cell_data["pressure"][0], case.parameter("pressure"), rtol=1e-9)
+    corners = mesh.points[mesh.cells[0].data]
+    spans = np.cross(corners[:, 1] - corners[:, 0], corners[:, faces - 1] - corners[:, 0])
+    assert ((spans * (corners[:, -1] - corners[:, 0])).sum(axis=1) > 0).all()  # As ParaView wants cells.
+
+
+def test_damaged_blocks_are_refused(solved_run: Run) -> None:
+    (example,) = counterexamples(solved_run).values()
+    arrays = dict(example.case.parameters)
+    check_bodies(arrays)
+    for name, wrong in (("contact", -1.0), ("cells", 99.0), ("nodes", np.nan)):
+        damaged = arrays[f"bodies_{name}"].copy()
+        damaged[0, 0] = wrong
+        with pytest.raises(ValueError, match=r"that no node has|not those|NaN"):
+            check_bodies(arrays | {f"bodies_{name}": damaged})

@@ -16,7 +16,7 @@ from contactverif.contract import schema
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import BODIES, Case, CaseSummary
 from contactverif.contract.counterexample import Counterexample, counterexamples, distinct, typeable
-from contactverif.contract.interface import PLANE
+from contactverif.contract.interface import PLANE, SPACE
 from contactverif.contract.property import (
     Finding,
     Measurement,
@@ -31,8 +31,8 @@ from contactverif.contract.result import NodalForces, Run
 from contactverif.contract.schema import Axes, Group, StoredColumns, Variable, codes, numbers, to_variables, words
 
 Table = dict[str, Variable]
-_OF_NODES = ("nodes", "fixed", "imposed", "load")  # Arrays (n_nodes, 2).
-_OF_BODIES = {"count": (), "is_slave": (), "young": (), "poisson": (), "axis": (2,), "start": (2,)}
+_OF_NODES = ("nodes", "fixed", "imposed", "load")  # Arrays (n_nodes, dim).
+_OF_BODIES = ("count", "is_slave", "young", "poisson")  # Arrays (n_bodies,).
 ARRAY_NAME = "case_array"  # The attribute that names the array of Case.to_arrays().
 _ARRAYS = {  # {array: (dimensions, long name, unit)}
     "nodes": (("node", "dim"), "reference positions, slave nodes first", schema.LENGTH),
@@ -373,16 +373,20 @@ def check_bodies(parameters: Mapping[str, NDArray[Any]]) -> None:
     packed = {name.removeprefix(BODIES): values for name, values in parameters.items() if name.startswith(BODIES)}
     if not packed:
         return
-    n_nodes = len(np.atleast_1d(packed["nodes"]))
-    shapes: dict[str, tuple[int, ...]] = dict.fromkeys(_OF_NODES, (n_nodes, 2))
-    shapes |= {name: (packed["count"].size, *rest) for name, rest in _OF_BODIES.items()}
-    shapes |= {name: (len(np.atleast_1d(packed[name])), width) for name, width in (("cells", 4), ("contact", 2))}
+    n_nodes, n_bodies = len(np.atleast_1d(packed["nodes"])), packed["count"].size
+    dim = SPACE if packed["nodes"].shape[1:] == (SPACE,) else PLANE
+    shapes: dict[str, tuple[int, ...]] = dict.fromkeys(_OF_NODES, (n_nodes, dim))
+    shapes |= dict.fromkeys(_OF_BODIES, (n_bodies,))
+    shapes |= {"axis": (n_bodies, 2, 3) if dim == SPACE else (n_bodies, 2), "start": (n_bodies, dim)}
+    widths = {"cells": 2**dim, "contact": 2 ** (dim - 1)}
+    shapes |= {name: (len(np.atleast_1d(packed[name])), width) for name, width in widths.items()}
     for name, shape in shapes.items():
         if packed[name].shape != shape or not np.isfinite(packed[name]).all():
             raise ValueError(f"{BODIES}{name} has the shape {packed[name].shape} or NaN; needed {shape}")
-    for name, low, high in (("cells", -1, n_nodes - 1), ("contact", 0, n_nodes - 1), ("count", 1, n_nodes)):
+    for name, low, high in (("cells", -1, n_nodes - 1), ("contact", -1, n_nodes - 1), ("count", 1, n_nodes)):
         numbers = packed[name]
         if (numbers != np.round(numbers)).any() or not ((numbers >= low) & (numbers <= high)).all():
             raise ValueError(f"{BODIES}{name} holds a number that no node has")
-    if packed["count"].sum() != n_nodes or (packed["cells"][:, :3] < 0).any():
-        raise ValueError(f"the nodes of {BODIES}count or {BODIES}cells are not those that are there")
+    missing = any((packed[name][:, :corners] < 0).any() for name, corners in (("cells", dim + 1), ("contact", dim)))
+    if packed["count"].sum() != n_nodes or missing:
+        raise ValueError(f"the nodes of {BODIES}count, {BODIES}cells or {BODIES}contact are not those that are there")

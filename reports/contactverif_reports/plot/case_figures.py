@@ -23,8 +23,16 @@ from contactverif.contract.case import Case
 from contactverif.contract.errors import MisuseError, printable
 from contactverif.contract.interface import PLANE, Surface
 from contactverif_reports.files import checked_name, whole
-from contactverif_reports.plot.geometry import Course, Gaps, format_number, one_digit, segment_lengths, unit_of
-from contactverif_reports.plot.text import reference_sizes, surfaces_headline
+from contactverif_reports.plot.geometry import (
+    Course,
+    Gaps,
+    format_number,
+    one_digit,
+    outer_faces,
+    segment_lengths,
+    unit_of,
+)
+from contactverif_reports.plot.text import describe_blocks, reference_sizes, surfaces_headline
 
 SUFFIXES = (".png", ".svg")
 # Lengths as shares of the size of the interface.
@@ -269,17 +277,21 @@ def _surface_figure(
     case: Case, *, title: str, forces: FloatArray | None, exact: FloatArray | None, width: float
 ) -> Figure:
     places, stretch = widen(view_from_above(case))
-    errors = None  # (n_nodes,) The error of each nodal force over the largest exact one, if both are known.
-    if forces is not None and exact is not None:
-        difference = (forces - exact).reshape(case.interface.nodes.shape)
-        largest = float(np.linalg.norm(exact.reshape(difference.shape), axis=1).max())
-        errors = np.linalg.norm(difference, axis=1) / (largest or 1.0)
+    interface, with_bodies = case.interface, bool(case.packed_bodies)
+    errors = sizes = None  # (n_nodes,) The error of each nodal force over the largest exact one, if both are known.
+    if forces is not None:
+        sizes = np.linalg.norm(forces.reshape(interface.nodes.shape), axis=1)
+        if exact is not None:
+            difference = (forces - exact).reshape(interface.nodes.shape)
+            largest = float(np.linalg.norm(exact.reshape(difference.shape), axis=1).max())
+            errors = np.linalg.norm(difference, axis=1) / (largest or 1.0)
     figure = Figure(figsize=(width, width / 2 + 1.2), layout="compressed")
-    panels = figure.subplots(1, 2, sharex=True, sharey=True)
-    interface = case.interface
+    grid = figure.add_gridspec(1, 2 + with_bodies, width_ratios=[3, 3, 2][: 2 + with_bodies])
+    first = figure.add_subplot(grid[0])
+    panels = first, figure.add_subplot(grid[1], sharex=first, sharey=first)
     titles = "slave, from inside", "master, from outside"
     for axes, surface, name in zip(panels, (interface.slave, interface.master), titles, strict=True):
-        _plot_faces(axes, surface, places, errors, _force_labels(surface, forces, exact))
+        _plot_faces(axes, surface, places, sizes if errors is None else errors, _force_labels(surface, forces, exact))
         axes.set_title(name, fontsize=8, pad=6 if forces is None else 22)  # Forces stand above the upper nodes.
         axes.margins(0.08)
         axes.set_aspect("equal", adjustable="box")
@@ -288,13 +300,20 @@ def _surface_figure(
         outlines = list(places[other.faces])
         axes.add_collection(PolyCollection(outlines, facecolors="none", edgecolors="0.8", linewidths=0.5, zorder=0))
         axes.autoscale_view()
+    if with_bodies:
+        plot_blocks(figure.add_subplot(grid[2]), case)
     lines = [surfaces_headline(case) + (f", drawn {format_number(stretch)} times wider across" if stretch > 1 else "")]
+    if with_bodies:
+        state = "the first guess" if exact is None else "the exact solution"
+        lines += [f"forces at {state}"] * (forces is not None) + describe_blocks(case, 1.0)
     if forces is not None:
         exactly = " and, where it differs, exact force" if errors is not None else ""
         lines.append(f"at the nodes, given room: number, force{exactly}")
     if errors is not None:
         share = f"up to {errors.max():.3g} of the largest exact force" if np.isfinite(errors).all() else "not finite"
         lines.append(f"shade: error of the nodal forces, {share}")
+    elif sizes is not None:
+        lines.append(f"shade: size of the nodal forces, up to {sizes.max():.3g}")
     wrapped = (textwrap.wrap(line, int(14 * width)) for line in [title, *lines, reference_sizes(case, 1.0)])
     figure.suptitle("\n".join(chain.from_iterable(wrapped)), fontsize=9, x=0.02, ha="left", parse_math=False)
     _thin_out(figure, np.zeros(len(places)) if errors is None else np.nan_to_num(errors, nan=np.inf))
@@ -318,8 +337,34 @@ def _thin_out(figure: Figure, errors: FloatArray) -> None:
             boxes.append(label.get_window_extent())
 
 
-def view_from_above(case: Case) -> FloatArray:
-    """Return plane coordinates (n_nodes, 2) of the current positions, seen against the master's mean normal."""
+def plot_blocks(axes: Axes, case: Case) -> None:
+    """Draw the bodies of a case in space from the side and from above, in their reference, far faces first."""
+    packed, towards = case.packed_bodies, np.array([0.5, -0.7, 0.5])  # Towards the eye, in the axes of the view.
+    towards = towards / np.linalg.norm(towards)
+    right = np.cross([0.0, 0.0, 1.0], towards)
+    right /= np.linalg.norm(right)
+    nodes = packed["nodes"] @ view_axes(case)
+    of_body = np.repeat(np.arange(len(packed["count"])), packed["count"].astype(np.int64))
+    shades, polygons = [], []
+    for faces in outer_faces(packed["cells"].astype(np.int64), packed["contact"].astype(np.int64)):
+        corners = nodes[faces]
+        turns = np.cross(corners[:, 1] - corners[:, 0], corners[:, -1] - corners[:, 0])
+        seen = turns @ towards > 0
+        polygons += list(corners[seen])
+        shades += [_BODY_SHADES[side] for side in (packed["is_slave"][of_body[faces[seen, 0]]] != 0).tolist()]
+    order = np.argsort([float(corners.mean(axis=0) @ towards) for corners in polygons])
+    places = [polygons[number] @ np.column_stack([right, np.cross(towards, right)]) for number in order]
+    look: dict[str, Any] = {"facecolors": [shades[number] for number in order], "edgecolor": "0.4", "linewidth": 0.4}
+    axes.add_collection(PolyCollection(places, **look))
+    axes.set_title("the bodies, slave darker", fontsize=8)
+    axes.margins(0.05)
+    axes.autoscale_view()
+    axes.set_aspect("equal", adjustable="box")
+    axes.set_axis_off()
+
+
+def view_axes(case: Case) -> FloatArray:
+    """Return the axes (3, 3) of a view against the master's mean normal as columns: to the right, up, to the eye."""
     positions, faces = case.positions, case.interface.master.faces
     corners = positions[faces]
     turns = np.cross(corners[:, 1] - corners[:, 0], corners[:, -1] - corners[:, 0]).sum(axis=0)
@@ -328,8 +373,13 @@ def view_from_above(case: Case) -> FloatArray:
     start = np.eye(3)[np.argmin(np.abs(normal))]
     right = np.cross(start, normal)
     right /= np.linalg.norm(right)
-    centred = positions - positions.mean(axis=0)
-    return np.column_stack([centred @ right, centred @ np.cross(normal, right)])
+    return np.column_stack([right, np.cross(normal, right), normal])
+
+
+def view_from_above(case: Case) -> FloatArray:
+    """Return plane coordinates (n_nodes, 2) of the current positions, seen against the master's mean normal."""
+    places: FloatArray = (case.positions - case.positions.mean(axis=0)) @ view_axes(case)[:, :2]
+    return places
 
 
 def widen(places: FloatArray) -> tuple[FloatArray, float]:
@@ -383,8 +433,8 @@ def _plot_faces(
 def make_mesh_figure(
     case: Case, width: float, *, forces: FloatArray | None = None, exact: FloatArray | None = None
 ) -> Figure:
-    """Return the figure of a case: its bodies, if it holds any, else its interface with forces."""
-    if case.packed_bodies:
+    """Return the figure of a case: its interface with forces; of bodies in the plane the bodies alone."""
+    if case.packed_bodies and case.interface.dim == PLANE:
         return make_outline_figure(case, width)
     return make_case_figure(case, forces=forces, exact=exact, width=width)
 

@@ -10,7 +10,8 @@ from typing import Self
 
 import numpy as np
 
-from contactverif.contract.arrays import UNIT_ROUNDOFF, BoolArray, FloatArray
+from contactverif.contract.arrays import UNIT_ROUNDOFF, BoolArray, FloatArray, IntArray
+from contactverif.contract.body import SIDES
 from contactverif.contract.case import Case
 from contactverif_reports.tables import decimal
 
@@ -102,6 +103,22 @@ class Gaps:
         """Return whether all nodes that face the master have the same gap, up to a length `roundoff`."""
         gap = self.gap[self.facing]
         return bool(len(gap) and np.ptp(gap) <= max(roundoff, 1e-9 * np.abs(gap).max()))
+
+
+def outer_faces(cells: IntArray, contact: IntArray) -> list[IntArray]:
+    """Return the faces (n, 3 or 4) around bodies in space, seen from outside; of a rigid body those that touch.
+
+    A shorter row of cells (n, 8) or of contact (n, 4) ends with −1.
+    """
+    parts = []
+    for corners, sides in SIDES.items():
+        solid = cells[(cells >= 0).sum(axis=1) == corners]
+        faces = np.concatenate([solid[:, side] for side in sides])
+        _, number, count = np.unique(np.sort(faces, axis=1), axis=0, return_inverse=True, return_counts=True)
+        parts.append(faces[count[number.reshape(-1)] == 1])
+    rigid = contact[~np.isin(contact[:, 0], cells)]
+    is_triangle = rigid[:, -1] < 0
+    return [part for part in (*parts, rigid[is_triangle, :3], rigid[~is_triangle]) if len(part)]
 
 
 def segment_lengths(case: Case) -> list[FloatArray]:

@@ -2,7 +2,7 @@
 
 import os
 import textwrap
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal, Self
 
 import matplotlib
@@ -20,8 +20,9 @@ from matplotlib.ticker import MaxNLocator
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray
 from contactverif.contract.case import Case
+from contactverif.contract.interface import PLANE
 from contactverif_reports.files import checked_name
-from contactverif_reports.plot.case_figures import SUFFIXES, hatch, save
+from contactverif_reports.plot.case_figures import SUFFIXES, hatch, plot_blocks, save, view_from_above
 from contactverif_reports.plot.geometry import Gaps, format_number, one_digit
 from contactverif_reports.plot.solved_scene import Solution, SolvedScene, pressures_across
 
@@ -138,16 +139,22 @@ def plot_scene(solved: SolvedScene, path: str | os.PathLike[str], *, title: str 
 @matplotlib.rc_context(_SMALL)
 def make_scene_figure(solved: SolvedScene, title: str = "") -> Figure:
     """Return the figure that `plot_scene` writes."""
-    box = close_up(solved)
-    panels = len(solved.solutions) + (box is not None)
-    width, height = np.ptp(np.vstack([body.nodes for body in solved.bodies]), axis=0) + 0.1 * solved.size
-    slope = height / width if box is None else 1.0
-    panel = float(np.clip((_WIDTH - 0.9) * slope, 0.8, 4.2))
-    heights = panels * (panel + 0.4) + 1.1, 8.2
+    if in_space := solved.case.interface.dim != PLANE:
+        heights = (len(solved.solutions) + 1) * 1.9 + 0.9, 5.0
+    else:
+        box = close_up(solved)
+        panels = len(solved.solutions) + (box is not None)
+        width, height = np.ptp(np.vstack([body.nodes for body in solved.bodies]), axis=0) + 0.1 * solved.size
+        slope = height / width if box is None else 1.0
+        panel = float(np.clip((_WIDTH - 0.9) * slope, 0.8, 4.2))
+        heights = panels * (panel + 0.4) + 1.1, 8.2
     figure = Figure(figsize=(_WIDTH, sum(heights)), layout=ConstrainedLayoutEngine(h_pad=0.07))
     grid = figure.add_gridspec(2, 1, height_ratios=heights)
     bodies, curves = figure.add_subfigure(grid[0]), figure.add_subfigure(grid[1])
-    _plot_meshes(bodies, solved, panels)
+    if in_space:
+        _plot_surfaces(bodies, solved)
+    else:
+        _plot_meshes(bodies, solved, panels)
     _plot_curves(curves, solved)
     soft = (body for body in solved.bodies if not body.rigid)
     moduli = ", ".join(f"{body.name} E {format_number(body.young)}, ν {format_number(body.poisson)}" for body in soft)
@@ -184,11 +191,33 @@ def _plot_meshes(figure: SubFigure, solved: SolvedScene, n_panels: int) -> None:
     bar.set_label("pressure across the interface, −σₙ (force / length)")
 
 
+def _plot_surfaces(figure: SubFigure, solved: SolvedScene) -> None:
+    """Draw the bodies, and for each solution both surfaces from above with the pressures of nodal forces at nodes."""
+    interface, scale = solved.case.interface, colour_scale(solved)
+    rows = figure.subplots(len(solved.solutions) + 1, 2, squeeze=False)
+    plot_blocks(rows[0, 0], solved.case)
+    for axes in rows.flat:
+        axes.set_axis_off()
+    for row, solution in zip(rows[1:], solved.solutions, strict=True):
+        places, pressures = view_from_above(replace(solved.case, z=solution.z)), solved.node_pressures(solution)
+        for axes, surface, name in zip(row, (interface.slave, interface.master), ("slave", "master"), strict=True):
+            edges = PolyCollection(list(places[surface.faces]), facecolor="none", edgecolor="0.4", linewidth=0.6)
+            axes.add_collection(edges)
+            at = places[surface.nodes].T
+            axes.scatter(*at, c=pressures[surface.nodes], cmap=scale.cmap, norm=scale.norm, s=24, zorder=3)
+            axes.set_title(f"{solution.formulation}\n{name}", parse_math=False)
+            axes.set_aspect("equal", adjustable="box")
+    bar = figure.colorbar(scale, ax=rows, location="bottom", aspect=30, pad=0.01)
+    bar.set_label("nodal force over its share (force / area)")
+
+
 def _plot_curves(figure: SubFigure, solved: SolvedScene) -> None:
-    panels = slave, master, residuals, energies = figure.subplots(4, 1)
-    _plot_pressures(slave, solved, "slave")
-    _plot_pressures(master, solved, "master")
-    master.set_xlabel("position along the interface (length)")
+    in_space = solved.case.interface.dim != PLANE
+    panels = *along, residuals, energies = figure.subplots(2 if in_space else 4, 1)
+    if not in_space:
+        _plot_pressures(along[0], solved, "slave")
+        _plot_pressures(along[1], solved, "master")
+        along[1].set_xlabel("position along the interface (length)")
     _plot_history(residuals, solved, "residuals")
     _plot_history(energies, solved, "energies")
     energies.set_xlabel("iterate")
@@ -257,9 +286,15 @@ def magnifications(solved: SolvedScene) -> dict[str, Magnification]:
 
 
 def colour_scale(solved: SolvedScene) -> ScalarMappable:
-    """Return a scale over the pressures of all cells of all solutions; a single exact pressure is in the middle."""
-    pairs = [pair for solution in solved.solutions for pair in zip(solved.bodies, solution.stresses, strict=True)]
-    pressures = np.concatenate([pressures_across(*pair) for pair in pairs])
+    """Return a scale over the pressures of all cells of all solutions, in space of all nodes of the interface.
+
+    A single exact pressure is in the middle.
+    """
+    if solved.case.interface.dim != PLANE:
+        pressures = np.concatenate([solved.node_pressures(solution) for solution in solved.solutions])
+    else:
+        pairs = [pair for solution in solved.solutions for pair in zip(solved.bodies, solution.stresses, strict=True)]
+        pressures = np.concatenate([pressures_across(*pair) for pair in pairs])
     pressures = pressures[np.isfinite(pressures)]
     low, high = (float(pressures.min()), float(pressures.max())) if len(pressures) else (0.0, 1.0)
     if len(solved.pressures) == 1:

@@ -5,15 +5,21 @@ its pressure.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from contactverif.contract.arrays import FloatArray, IntArray
 from contactverif.contract.body import Body
 from contactverif.contract.case import Case
+from contactverif.contract.interface import PLANE, SPACE, turns_of
 from contactverif_reports.plot.geometry import Course
 
+# {dim: {name of a component of the stress: its place in the tensor}}
+STRESSES = {
+    PLANE: {"xx": (0, 0), "yy": (1, 1), "xy": (0, 1)},
+    SPACE: {"xx": (0, 0), "yy": (1, 1), "zz": (2, 2), "yz": (1, 2), "xz": (0, 2), "xy": (0, 1)},
+}
 _SLIVER = 1e-6  # A smaller share of a segment under the other side counts as none.
 
 
@@ -34,12 +40,12 @@ class Solution:
     formulation: str  # The name on the command line.
     end: str  # How the solution ended, in a few words: "converged", "2-cycle", ….
     converged: bool  # Whether the last iterate is a solution.
-    # Displacements of the nodes of each body (n_nodes, 2), global axes, a length.
+    # Displacements of the nodes of each body (n_nodes, dim), global axes, a length.
     displacements: tuple[FloatArray, ...]
-    # Stresses of each body (n_cells, 3), means over the Gauss points: xx, yy and xy in global axes, force per length².
+    # Stresses of each body (n_cells, 3 or 6), means over the Gauss points: STRESSES in global axes, force per length².
     stresses: tuple[FloatArray, ...]
     z: FloatArray  # (n_unknowns,) Positions of the interface, flat.
-    forces: FloatArray  # (n_nodes, 2) Contact forces on the nodes of the interface; NaN where the plugin gives none.
+    forces: FloatArray  # (n_nodes, dim) Contact forces on the nodes of the interface; NaN where the plugin gives none.
     # (n_iterates,) As in a trace: the largest force that is not in balance, the energy of the step from there (NaN at
     # the last), the residual's own roundoff, and the share of the loads.
     residuals: FloatArray
@@ -111,8 +117,11 @@ class SolvedScene:
         """Return the pressure (n_nodes,) of the nodal forces: along the normal, over the node's share of the interface.
 
         A uniform pressure comes out exactly. The share is the integral of the node's shape function over the part of
-        the surface that lies under the other side; without such a part the pressure is NaN.
+        the surface that lies under the other side; without such a part the pressure is NaN. In space it is the share
+        of the whole faces.
         """
+        if self.case.interface.dim != PLANE:
+            return pressures_of_forces(replace(self.case, z=solution.z), solution.forces)
         shares = self.shares(solution.z.reshape(-1, 2))
         lengths = np.linalg.norm(shares, axis=1)
         shares[lengths == 0] = np.nan
@@ -135,10 +144,35 @@ class SolvedScene:
 
 
 def pressures_across(body: Body, stresses: FloatArray) -> FloatArray:
-    """Return −σ across the first axis of a body in each cell, of `stresses` (n_cells, 3): xx, yy, xy in global axes."""
-    x, y = body.axis
-    xx, yy, xy = stresses.T
-    pressures: FloatArray = 2 * x * y * xy - y * y * xx - x * x * yy
+    """Return −σ along the last axis of a body in each cell, of `stresses` (n_cells, 3 or 6) in global axes."""
+    normal = body.frame[:, -1]
+    pressures: FloatArray = -(as_tensors(stresses) @ normal @ normal)
+    return pressures
+
+
+def as_tensors(stresses: FloatArray) -> FloatArray:
+    """Return tensors (n_cells, dim, dim) of stresses (n_cells, 3 or 6), in the order of STRESSES."""
+    dim = PLANE if stresses.shape[1] == len(STRESSES[PLANE]) else SPACE
+    tensors = np.zeros((len(stresses), dim, dim))
+    for column, (i, j) in zip(stresses.T, STRESSES[dim].values(), strict=True):
+        tensors[:, i, j] = tensors[:, j, i] = column
+    return tensors
+
+
+def pressures_of_forces(case: Case, forces: FloatArray) -> FloatArray:
+    """Return the pressures (n_nodes,) of nodal forces in space, over a node's share of the area of its faces.
+
+    It is 0 at a node whose faces have no mean normal.
+    """
+    shares = np.zeros_like(case.positions)  # (n_nodes, 3) Along the normal, as long as the node's share of the area.
+    for surface in (case.interface.slave, case.interface.master):
+        normals = turns_of(case.positions[surface.faces]).sum(axis=1)
+        areas = normals / np.linalg.norm(normals, axis=1, keepdims=True) * surface.measures(case.positions)[:, None]
+        np.add.at(shares, surface.faces, areas[:, None] / surface.faces.shape[1])
+    squares = (shares**2).sum(axis=1)
+    pressures: FloatArray = np.divide(
+        -(forces * shares).sum(axis=1), squares, np.zeros(len(squares)), where=squares > 0
+    )
     return pressures
 
 

@@ -159,8 +159,29 @@ def _surfaces(case: Case, width: int, worst: set[int]) -> str:
     if "penetration" in case.parameters:
         notes.append(f"penetration {format_number(case.parameter('penetration') / unit)} everywhere")
     notes += filter(None, [reference_sizes(case, unit)])
-    notes.append(f"penalty {format_number(case.penalty)}   seed {case.seed}")
+    lines += describe_blocks(case, unit)
+    known = [(name, case.parameter(name)) for name in ("pressure", "approach") if name in case.parameters]
+    numbers = [f"{name} {format_number(number)}" for name, number in (("penalty", case.penalty), *known)]
+    notes.append("   ".join([*numbers, f"seed {case.seed}"]))
     return "\n".join([*lines, *_wrap(notes, width)])
+
+
+def describe_blocks(case: Case, unit: float) -> list[str]:
+    """Return a line for each body of a case in space: its cells, the heights of their layers, its material."""
+    packed, lines = case.packed_bodies, []
+    ends = np.cumsum(packed.get("count", np.zeros(0))).astype(np.int64).tolist()
+    for body, (start, end) in enumerate(pairwise([0, *ends])):
+        nodes, first = packed["nodes"][start:end], packed["cells"][:, 0]
+        cells = packed["cells"][(first >= start) & (first < end)]
+        axis = np.cross(*packed["axis"][body])
+        levels = np.unique(np.round((nodes @ axis) / unit, 9)) if len(nodes) else np.zeros(0)
+        heights = [format_number(height, 1e-6 * abs(height)) for height in np.diff(levels)]
+        layers = f" in layers of {', '.join(heights)}" if len(heights) <= _LISTED_SIZES else ""
+        kind = "hexahedra" if len(cells) and (cells >= 0).all() else "tetrahedra"
+        material = f"E {format_number(packed['young'][body])}, ν {format_number(packed['poisson'][body])}"
+        words = f"{len(cells)} {kind}{layers}, {material}" if len(cells) else "rigid"
+        lines.append(f"  {'slave' if packed['is_slave'][body] else 'master'}: {words}")
+    return lines
 
 
 # A straight interface as two lines.

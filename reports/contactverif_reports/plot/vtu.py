@@ -9,25 +9,31 @@ import numpy as np
 from contactverif.contract.arrays import FloatArray, IntArray
 from contactverif.contract.case import Case
 from contactverif.contract.errors import MisuseError
-from contactverif.contract.interface import turns_of
+from contactverif.contract.interface import PLANE, SPACE
 from contactverif.contract.result import NodalForces
 from contactverif_reports.files import checked_name, whole
-from contactverif_reports.plot.solved_scene import Solution, SolvedScene, pressures_across
+from contactverif_reports.plot.solved_scene import (
+    STRESSES,
+    Solution,
+    SolvedScene,
+    pressures_across,
+    pressures_of_forces,
+)
 
 _KINDS = {2: "line", 3: "triangle", 4: "quad"}
+_SOLIDS = {4: "tetra", 8: "hexahedron"}
 _SIDES = {"slave": 0, "master": 1, "": -1}
-_CELL_DATA = ("stress_xx", "stress_yy", "stress_xy", "pressure", "body", "side")
 
 
 def write_vtu(solved: SolvedScene, solution: Solution, path: str | os.PathLike[str]) -> None:
     """Write one solution to a .vtu file: all bodies in their reference configuration.
 
     On points: `displacement` and `contact_force` (three components, the last 0), `contact_pressure` (nodal force over
-    the node's share of the interface; 0 off the interface). On cells: `stress_xx`, `stress_yy`, `stress_xy` (means
-    over the Gauss points), `pressure` (−σ across the body's first axis; 0 in a rigid body), `body` (its number) and
-    `side` (0 slave, 1 master, −1 out of reach). A rigid body is the line cells of its surface.
+    the node's share of the interface; 0 off the interface). On cells: `stress_xx` and so on (means over the Gauss
+    points), `pressure` (−σ along the body's last axis; 0 in a rigid body), `body` (its number) and
+    `side` (0 slave, 1 master, −1 out of reach). A rigid body is the lines or faces of its surface.
     """
-    nodes = np.vstack([body.nodes for body in solved.bodies])
+    nodes, components = np.vstack([body.nodes for body in solved.bodies]), STRESSES[solved.bodies[0].dim]
     forces, pressures = np.zeros_like(nodes), np.zeros(len(nodes))
     node_pressures = solved.node_pressures(solution)
     firsts = itertools.accumulate((len(body.nodes) for body in solved.bodies[:-1]), initial=0)
@@ -38,13 +44,15 @@ def write_vtu(solved: SolvedScene, solution: Solution, path: str | os.PathLike[s
             forces[first + body.contact_nodes] = solution.forces[on]
             pressures[first + body.contact_nodes] = np.nan_to_num(node_pressures[on])
         corners = body.contact if body.rigid else body.cells
-        stresses = np.zeros((len(corners), 3)) if body.rigid else solution.stresses[number]
+        stresses = np.zeros((len(corners), len(components))) if body.rigid else solution.stresses[number]
         side = np.full(len(corners), _SIDES[solved.sides[number]])
         columns = [stresses, pressures_across(body, stresses), np.full(len(corners), number), side]
-        cells.setdefault(_KINDS[corners.shape[1]], []).append(corners + first)
-        data.setdefault(_KINDS[corners.shape[1]], []).append(np.column_stack(columns))
+        kinds = _KINDS if body.rigid or body.dim == PLANE else _SOLIDS
+        cells.setdefault(kinds[corners.shape[1]], []).append(corners + first)
+        data.setdefault(kinds[corners.shape[1]], []).append(np.column_stack(columns))
     blocks = [np.vstack(parts) for parts in data.values()]
-    types = [np.int64 if name in ("body", "side") else np.float64 for name in _CELL_DATA]
+    names = [*(f"stress_{name}" for name in components), "pressure", "body", "side"]
+    types = [np.int64 if name in ("body", "side") else np.float64 for name in names]
     _write(
         path,
         points=_in_space(nodes),
@@ -56,7 +64,7 @@ def write_vtu(solved: SolvedScene, solution: Solution, path: str | os.PathLike[s
         },
         cell_data={
             name: [block[:, column].astype(dtype) for block in blocks]
-            for column, (name, dtype) in enumerate(zip(_CELL_DATA, types, strict=True))
+            for column, (name, dtype) in enumerate(zip(names, types, strict=True))
         },
     )
 
@@ -72,7 +80,7 @@ def write_surfaces(case: Case, forces: NodalForces | None, path: str | os.PathLi
     kinds = {} if forces is None else {"": forces.of_formulation, "exact_": forces.exact}
     for prefix, values in kinds.items():
         if values is not None:
-            point_data |= {f"{prefix}force": values, f"{prefix}pressure": _node_pressures(case, values)}
+            point_data |= {f"{prefix}force": values, f"{prefix}pressure": pressures_of_forces(case, values)}
     sides = {"slave": case.interface.slave.faces, "master": case.interface.master.faces}
     _write(
         path,
@@ -99,19 +107,5 @@ def _write(path: str | os.PathLike[str], **arrays: Any) -> None:
 
 
 def _in_space(vectors: FloatArray) -> FloatArray:
-    """Return vectors (n, 3) with a third component 0, which ParaView needs, from vectors (n, 2)."""
-    return np.column_stack([vectors, np.zeros(len(vectors))])
-
-
-def _node_pressures(case: Case, forces: FloatArray) -> FloatArray:
-    """Return the pressures (n_nodes,) of nodal forces; 0 at a node whose faces have no mean normal."""
-    shares = np.zeros_like(case.positions)  # (n_nodes, 3) Along the normal, as long as the node's share of the area.
-    for surface in (case.interface.slave, case.interface.master):
-        normals = turns_of(case.positions[surface.faces]).sum(axis=1)
-        areas = normals / np.linalg.norm(normals, axis=1, keepdims=True) * surface.measures(case.positions)[:, None]
-        np.add.at(shares, surface.faces, areas[:, None] / surface.faces.shape[1])
-    squares = (shares**2).sum(axis=1)
-    pressures: FloatArray = np.divide(
-        -(forces * shares).sum(axis=1), squares, np.zeros(len(squares)), where=squares > 0
-    )
-    return pressures
+    """Return vectors (n, 3), which ParaView needs: those in the plane (n, 2) with a third component 0."""
+    return np.column_stack([vectors, np.zeros((len(vectors), SPACE - vectors.shape[1]))])
