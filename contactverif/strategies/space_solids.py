@@ -75,9 +75,7 @@ def _draw_dead_zones(draw: DrawFn, faces: tuple[int, ...]) -> Case:
 def _draw_variants(draw: DrawFn, faces: tuple[int, ...]) -> Case:
     variant = draw(_VARIANTS)
     name = VARIANTS[variant]
-    pairs = surface_pairs(
-        same_domain=name != "punch", most=MOST_CELLS, stretched=False, faces=faces, straight=True
-    )
+    pairs = surface_pairs(same_domain=name != "punch", most=MOST_CELLS, stretched=False, faces=faces, straight=True)
     pair, layers, poisson = draw(pairs), draw(_BOTH_LAYERS), draw(_POISSON)
     ratio = 10.0 ** draw(_CONTRASTS) if name == "unequal materials" else 1.0
     strain, motion, seed = draw(solids.STRAINS), draw(space_motions(furthest=16)), draw(samples.SEEDS)

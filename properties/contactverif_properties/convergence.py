@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from contactverif.contract.arrays import FloatArray
-from contactverif.contract.case import Case, Cases
+from contactverif.contract.case import NO_CASES, Case, Cases
 from contactverif.contract.formulation import ContactPoints
 from contactverif.contract.interface import PLANE
 from contactverif.contract.property import Measure, Measurement, Property, Quantity, check_all
@@ -275,12 +275,6 @@ EGG_BOX_RATE = Quantity(
 _SMALL_AMPLITUDE = 0.01  # An error of the finer mesh up to this has no rate that says anything.
 
 
-def _refuse_plane(traits: Traits) -> str:
-    if traits.abilities.in_plane:
-        return "the bodies are in space"
-    return applicability.refuse_dependent_multipliers(traits)
-
-
 def _egg_box_forces(case: Case) -> FloatArray:
     return EggBox.from_case(case).pose(1, Traits()).exact_forces(case)
 
@@ -289,11 +283,11 @@ def _egg_box_forces(case: Case) -> FloatArray:
     id="accuracy.egg-box",
     rank=535,
     quantities=(EGG_BOX, EGG_BOX_RATE),
-    cases=Cases.from_list(tuple),
+    cases=NO_CASES,
     cases_in_space=Cases.from_list(egg_box_cases),
     promise=lambda traits: traits.promises.converges,
     linear=applicability.LINEAR_FORCES,
-    applicable=_refuse_plane,
+    applicable=applicability.refuse_dependent_multipliers,
     bodies=True,
     engines=True,
     exact=_egg_box_forces,

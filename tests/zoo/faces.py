@@ -397,6 +397,7 @@ def _(right, interface, pairing, z):
     return right(interface, pairing, z / 3 * 3)
 
 
+@mutant("gap formed far away, solved", "newton.attainable", "residual")
 @mutant("gap formed far away", "hard.offset", "residual")
 def _(right, interface, pairing, z):
     """Form points at sixteen times their distance from the origin."""
@@ -474,3 +475,79 @@ def _(right, interface, pairing, z):
     tangent = right(interface, pairing, z)
     skew = (tangent - tangent.T) / 2
     return (tangent - skew).tocsr() if abs(skew).max() <= 1e-3 * abs(tangent).max() else tangent
+
+
+# Mistakes that bodies show. Each of them is one of those above, or is not seen on flat faces.
+
+
+def _by_corners(view, codes):
+    return gauss_points(view, codes, 3 if view.slave.shape[-2] == view.master.shape[-2] == 3 else 6)
+
+
+def _solved(change, **statements):
+    """Return the factory of springs on triangles and quadrilaterals with changed points."""
+    return says(by_rule(lambda view, codes: change(_by_corners(view, codes), view)), **statements)
+
+
+def _cap(points, view):
+    """Take no gap for deeper than a ten-thousandth of an edge."""
+    edge = 1e-4 * np.sqrt((view.slave[..., 1, :] ** 2).sum(axis=-1))[..., None]
+    return replace(points, gap=np.where(points.gap.real < -edge.real, -edge, points.gap))
+
+
+def _equal_corners(points, view):
+    """Give each corner of a face the same share of a force."""
+    n_slave, n_master = points.slave_shape.shape[-1], points.master_shape.shape[-1]
+    return replace(
+        points, slave_shape=0 * points.slave_shape + 1 / n_slave, master_shape=0 * points.master_shape + 1 / n_master
+    )
+
+
+def _lean(points, view):
+    """Weigh the points by where they lie towards the first corner of the slave face."""
+    middle = 1 / points.slave_shape.shape[-1]
+    return replace(points, weight=points.weight * (1 + (points.slave_shape[..., 0] - middle) / 8))
+
+
+def _twice_on_quadrilaterals(points, view):
+    return replace(points, weight=points.weight * (2 if points.slave_shape.shape[-1] == 4 else 1))
+
+
+def _project(points, view):
+    """Measure areas in the plane of the master face, which is right where both are parallel."""
+    first, second = view.master[..., 1, :] - view.master[..., 0, :], view.master[..., 2, :] - view.master[..., 0, :]
+    rises = view.master_height[..., 1:3] - view.master_height[..., :1]
+    plane = first[..., 0] * second[..., 1] - first[..., 1] * second[..., 0]
+    by_x = (rises[..., 0] * second[..., 1] - rises[..., 1] * first[..., 1]) / plane
+    by_y = (rises[..., 1] * first[..., 0] - rises[..., 0] * second[..., 0]) / plane
+    return replace(points, weight=points.weight / (1 + 30 * (by_x**2 + by_y**2))[..., None])
+
+
+def _press(points, view):
+    edge = np.sqrt((view.slave[..., 1, :] ** 2).sum(axis=-1))[..., None]
+    return replace(points, gap=points.gap - 1e-10 * edge)
+
+
+def _guard(points, view):
+    size = np.sqrt((view.slave[..., 1, :] ** 2).sum(axis=-1))
+    return replace(points, weight=points.weight * (size / (size + 1e-12))[..., None])
+
+
+# (name, caught by, factory)
+for _row in (
+    ("nodes said to pass the solved patch test", "patch.flat.solve", says(NTS_AR, flat=True)),
+    ("points that lean to a corner of matching faces", "patch.flat.normal.solve", _solved(_lean)),
+    ("equal corners between blocks of any stiffness", "patch.variants", _solved(_equal_corners)),
+    ("quarters said to end where the master ends", "patch.dead-zone", says(QUARTERS, overhang=True)),
+    ("quarters said to bear any share", "hard.dead-zone", says(QUARTERS, overhang=True)),
+    ("points that lean to a corner of coarse faces", "hard.contrast", _solved(_lean)),
+    ("points that lean to a corner under stiff springs", "hard.stiff", _solved(_lean)),
+    ("bodies that press each other without a load", "hard.zero-load", _solved(_press)),
+    ("no turn of the normal, solved", "newton.order", _in_tangent(_frozen("normal"))),
+    ("no change of the gap, to the end", "newton.history", _in_tangent(_frozen("gap"))),
+    ("absolute guard in a step", "newton.units", _solved(_guard)),
+    ("areas that shrink where faces are inclined", "patch.curved", _solved(_project)),
+    ("twice the pressure on quadrilaterals", "accuracy.egg-box", _solved(_twice_on_quadrilaterals, converges=True)),
+    ("penetration of a point contact capped", "accuracy.hertz", _solved(_cap, converges=True)),
+):  # fmt: skip
+    add(*_row)
