@@ -94,18 +94,15 @@ _SLOPES = st.tuples(*[st.sampled_from([1, 2, 3, -5, 8, 13, -16, 20])] * 2)
 _BUMPS = st.sampled_from([0.0, 0.03, 0.06])
 
 
-def _tilted(
-    slopes: SearchStrategy[tuple[int, ...]],
-) -> Callable[[DrawFn, tuple[int, ...]], Case]:
+def _tilted(slopes: SearchStrategy[tuple[int, ...]], most: int = 3) -> Callable[[DrawFn, tuple[int, ...]], Case]:
     def draw_case(draw: DrawFn, faces: tuple[int, ...]) -> Case:
-        pairs = surface_pairs(same_domain=False, most=3, stretched=False, faces=faces, straight=True)
+        pairs = surface_pairs(same_domain=False, most=most, stretched=False, faces=faces, straight=True)
         pair, layers, young, poisson = draw(pairs), draw(_BOTH_LAYERS), draw(_YOUNG), draw(_POISSON)
         exponent, motion, seed = draw(solids.TILTED_STRAINS), draw(space_motions(furthest=16)), draw(samples.SEEDS)
         tilt, stiff, bump = draw(slopes), draw(solids.STIFF), draw(_BUMPS)
         strain = 2.0 ** -min(exponent, solids.SMALLEST_STRAIN.get(stiff, exponent))
-        return _scene(
-            pair.lay_out(), layers, young, poisson, motion, strain=strain, slopes=tilt, stiff=stiff, bump=bump
-        ).case(seed=seed)
+        laid_out, varied = pair.lay_out(), {"slopes": tilt, "stiff": stiff, "bump": bump}
+        return _scene(laid_out, layers, young, poisson, motion, strain=strain, **varied).case(seed=seed)
 
     return draw_case
 
@@ -116,6 +113,8 @@ space_dead_zone_cases = _on_scene(_draw_dead_zones, "space_dead_zone_cases")
 space_variant_cases = _on_scene(_draw_variants, "space_variant_cases")
 space_solid_cases = _on_scene(_tilted(_SLOPES), "space_solid_cases", uniform=False)
 space_closed_cases = _on_scene(_tilted(_CLOSED_SLOPES), "space_closed_cases", uniform=False)
+# Few points, so that few of them are near a kink.
+space_smooth_cases = _on_scene(_tilted(_CLOSED_SLOPES, most=2), "space_smooth_cases", uniform=False)
 
 
 def _scene(

@@ -28,7 +28,7 @@ from contactverif.mechanics.newton import MAX_ITERATIONS, End, Trace, solve
 from contactverif.mechanics.scene import Scene, scene_of
 from contactverif.mechanics.system import ROUNDOFF_FACTOR, System
 from contactverif.strategies.solids import closed_cases, solid_cases
-from contactverif.strategies.space_solids import space_closed_cases, space_solid_cases
+from contactverif.strategies.space_solids import space_closed_cases, space_smooth_cases, space_solid_cases
 from contactverif_properties import applicability
 from contactverif_properties.kinks import find_kink
 from contactverif_properties.roundoff import (
@@ -230,7 +230,7 @@ def _find_excuse(system: System, trace: Trace) -> str:
     return ""
 
 
-@_define(id="newton.order", rank=460, quantities=(ORDER,))
+@_define(id="newton.order", rank=460, quantities=(ORDER,), cases_in_space=Cases.random(space_smooth_cases))
 def newton_order(case: Case, subject: Subject) -> Measurement:
     """One Newton step from near a solution ends at a distance of second order.
 
