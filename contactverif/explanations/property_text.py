@@ -111,10 +111,10 @@ def property_text(question: Property) -> str:
     cases = "elastic bodies, solved by Newton's method" if question.bodies else "an interface alone; nothing is solved"
     needs = ", ".join(f"`{part}`" for part in sorted(question.needs)) or "`residual` only"
     in_space = ", and in space, where a segment is a face" if question.cases_in_space else ""
-    where = f"in the plane{in_space}" if question.cases != NO_CASES else "in space"
+    place = f"in the plane{in_space}" if question.cases != NO_CASES else "in space"
     facts = [
         ("Cases", cases),
-        ("Dimensions", where),
+        ("Dimensions", place),
         ("Parts of the plugin that it needs", needs),
         ("Promised by", promised_by(question)),
         *([("Not asked of a law of its own", question.linear)] if question.linear else []),

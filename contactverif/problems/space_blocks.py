@@ -40,7 +40,8 @@ class SpaceMotion:
     def axes(self) -> FloatArray:
         """The unit vectors (3, 3) that the axes become, as rows."""
         rows, size = rotation(self.quaternion)
-        return np.array(rows).T / size
+        axes: FloatArray = np.array(rows).T / size
+        return axes
 
     @property
     def normal(self) -> FloatArray:
@@ -142,7 +143,7 @@ def space_blocks(
         flattening = np.outer(1 - levels / levels[-1] if levels[-1] else [1.0], heights[index]).reshape(-1)
         nodes = np.column_stack([np.tile(flat, (len(levels), 1)), np.repeat(sign * levels, n) + flattening])
         fixed, imposed, load = (np.zeros(nodes.shape, kind) for kind in (bool, float, float))
-        fixed[:, :2] = np.tile(_held_sides(Surface(faces), flat), (len(levels), 1))
+        fixed[:, :2] = np.tile(_mark_rollers(Surface(faces), flat), (len(levels), 1))
         far = slice(len(nodes) - n, len(nodes))
         if rigid:
             fixed[:] = True
@@ -184,14 +185,14 @@ def rectangle(x: FloatArray, y: FloatArray, corners: int) -> tuple[FloatArray, I
     return points, np.vstack([faces[:, :3], faces[:, [0, 2, 3]]]) if corners == TRIANGLE else faces
 
 
-def _held_sides(surface: Surface, plane: FloatArray) -> BoolArray:
+def _mark_rollers(surface: Surface, plane: FloatArray) -> BoolArray:
     """Return which of both components (n, 2) of each node the rollers at the sides hold.
 
     A side along an axis is held across it; one that is inclined against the axes holds both.
     """
     face, edge = np.nonzero(surface.neighbours < 0)
     ends = np.stack([surface.faces[face, edge], surface.faces[face, (edge + 1) % surface.faces.shape[1]]], axis=1)
-    held = np.zeros(plane.shape, bool)
+    rollers = np.zeros(plane.shape, bool)
     across = np.diff(plane[ends], axis=1)[:, 0, ::-1] != 0  # Across an edge along the first axis is the second one.
-    np.logical_or.at(held, ends, across[:, None])
-    return held
+    np.logical_or.at(rollers, ends, across[:, None])
+    return rollers

@@ -105,7 +105,8 @@ def _shells(shells: Shells, inner_slave: bool, refine: int, whole: bool) -> Scen
 
 def _octant(n_edges: int) -> tuple[FloatArray, IntArray]:
     """Return points (n, 3) of the unit sphere's octant and triangles, counter-clockwise seen from outside."""
-    number, steps = {}, []
+    number: dict[tuple[int, int], int] = {}
+    steps: list[tuple[int, int, int]] = []
     for i, j in product(range(n_edges + 1), repeat=2):
         if i + j <= n_edges:
             number[i, j] = len(steps)
@@ -203,8 +204,8 @@ class EggBox:
 def _egg_box(box: EggBox, refine: int, penalty: float) -> Scene:
     grids = []
     for counts in ((4 * refine, 3 * refine), (3 * refine, 4 * refine)):
-        lines = (np.linspace(0.0, side, n + 1) for side, n in zip(box.sides, counts, strict=True))
-        grids.append(rectangle(*lines, box.corners))
+        x, y = (np.linspace(0.0, side, n + 1) for side, n in zip(box.sides, counts, strict=True))
+        grids.append(rectangle(x, y, box.corners))
     (slave, below), (master, above) = grids
     nodes = [np.column_stack([points, np.zeros(len(points))]) for points in (slave, master)]
     nodes[0][:, 2] = -box.wave * box.cosines(nodes[0])
@@ -312,7 +313,8 @@ def _hertz_point(point: HertzPoint, cells: int) -> Scene:
         fixed=fixed, imposed=imposed, name="box",
     )  # fmt: skip
     n_master = int(cells * 5 / 3) + 1
-    places, below = rectangle(*[np.linspace(-0.15, 1.45, n_master + 1)] * 2, TRIANGLE)
+    across = np.linspace(-0.15, 1.45, n_master + 1)
+    places, below = rectangle(across, across, TRIANGLE)
     heights = (places**2).sum(axis=1) / (2 * point.radius) - point.contact_radius**2 / point.radius
     points = np.column_stack([places, heights])
     rigid = Body(

@@ -27,7 +27,7 @@ _FINE, _COARSE = np.linspace(0.0, SIDE, 7).tolist(), [0.0, 7.0, SIDE]
 
 def _blocks(corners: int, slave: Lines, master: Lines, ratio: float, *, stiff: float, **others: Any) -> Scene:
     """Return two blocks over grids with the same lines along both axes; ε̂ is in E/h of the softer body."""
-    (above, below), (under, upper) = (rectangle(*[np.array(lines)] * 2, corners) for lines in (slave, master))
+    (above, below), (under, upper) = (rectangle(np.array(lines), np.array(lines), corners) for lines in (slave, master))
     flat = [np.column_stack([points, np.zeros(len(points))]) for points in (above, under)]
     interface = Interface.from_faces(flat[0], below[:, ::-1], flat[1], upper)
     low, high = max(slave[0], master[0]), min(slave[-1], master[-1])
@@ -44,7 +44,7 @@ def _blocks(corners: int, slave: Lines, master: Lines, ratio: float, *, stiff: f
     )
 
 
-def _named(name: str, scene: Scene) -> Case:
+def _name(name: str, scene: Scene) -> Case:
     return replace(scene, name=name).case()
 
 
@@ -53,18 +53,18 @@ def stiff_space_scenes(corners: int) -> Iterator[Case]:
     """Return blocks whose springs are up to 1e10 times as stiff as the softer one; E of the other is 1 to 1e6 times."""
     for stiff, ratio in product(("1e4", "1e10"), _RATIOS):
         scene = _blocks(corners, [0.0, 3.0, 8.0, SIDE], [0.0, 5.0, SIDE], float(ratio), stiff=float(stiff))
-        yield _named(f"ε̂h/E = {stiff}, E ratio {ratio}", scene)
+        yield _name(f"ε̂h/E = {stiff}, E ratio {ratio}", scene)
 
 
 @collect_on_faces
 def contrast_space_scenes(corners: int) -> Iterator[Case]:
     """Return a fine block and a coarse one, each as the slave, the stiffer one or the softer one, at two penalties."""
-    for (mesh, lines), ratio, (label, stiff) in product(
+    for (mesh, (slave, master)), ratio, (label, stiff) in product(
         {"6 on 2": (_FINE, _COARSE), "2 on 6": (_COARSE, _FINE)}.items(),
         _RATIOS,
         (("10 E/h", MODERATE_PENALTY), ("1e5 E/h", 1e5)),
     ):
-        yield _named(f"{mesh}, E ratio {ratio}, ε̂ = {label}", _blocks(corners, *lines, float(ratio), stiff=stiff))
+        yield _name(f"{mesh}, E ratio {ratio}, ε̂ = {label}", _blocks(corners, slave, master, float(ratio), stiff=stiff))
 
 
 @collect_on_faces
@@ -77,7 +77,7 @@ def vanishing_space_scenes(corners: int) -> Iterator[Case]:
         )
         facts = {**scene.facts, "share": np.array(share)}
         name = f"overlap 1e-{exponent}{', inclined' if motion is _INCLINED else ''}"
-        yield _named(name, replace(scene, facts=facts))
+        yield _name(name, replace(scene, facts=facts))
 
 
 @collect_on_faces
@@ -90,4 +90,4 @@ def unloaded_space_scenes(corners: int) -> Iterator[Case]:
         {"free": "pressure", "held": "approach"}.items(),
     ):
         others: dict[str, Any] = {load: 0.0, "lowered": lowered, "motion": motion}
-        yield _named(f"{way}, {start}{label}", _blocks(corners, slave, master, 3.0, stiff=MODERATE_PENALTY, **others))
+        yield _name(f"{way}, {start}{label}", _blocks(corners, slave, master, 3.0, stiff=MODERATE_PENALTY, **others))

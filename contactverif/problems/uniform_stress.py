@@ -12,6 +12,7 @@ faces; u = 2⁻⁵³; X is the largest coordinate; M is the stiffer body's oedom
 displacement; ℓ is the shortest segment; p is the exact pressure.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -59,7 +60,8 @@ def _segment_lengths(scene: Scene) -> tuple[float, float]:
 def condition_tolerance(scene: Scene, penalty: float) -> float:
     """Return what the solution of the linear system may add to a stress over p: CONDITION_TOLERANCE as a number."""
     young = [body.young for body in scene.bodies if not body.rigid]
-    h = float(scene.interface.slave.measures(scene.interface.nodes).mean()) ** (1 / (scene.dim - 1))
+    mean = float(scene.interface.slave.measures(scene.interface.nodes).mean())
+    h = mean if scene.dim == PLANE else math.sqrt(mean)
     return 1e-11 + 1e-13 * max(penalty * h, *young) / min(young) + 5e-15 / _segment_lengths(scene)[1]
 
 

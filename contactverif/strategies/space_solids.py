@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from hypothesis import strategies as st
@@ -29,11 +30,11 @@ def _on_scene(
     draw_scene: Callable[[DrawFn, tuple[int, ...]], Case], name: str, *, uniform: bool = True
 ) -> Callable[..., SearchStrategy[Case] | None]:
     """Return the cases of a function that draws one on some faces; given a scene, that scene alone if it fits."""
-    drawn = st.composite(draw_scene)
+    cases = st.composite(draw_scene)
 
     def make(scene: Case | None = None, faces: tuple[int, ...] = (TRIANGLE,)) -> SearchStrategy[Case] | None:
         if scene is None:
-            return drawn(faces)
+            return cases(faces)
         return st.just(scene) if has_bodies(scene) and (is_uniform(scene) or not uniform) else None
 
     return random_source(f"contactverif.strategies.space_solids.{name}", solids.UNIFORM if uniform else "")(make)
@@ -68,8 +69,8 @@ def _draw_dead_zones(draw: DrawFn, faces: tuple[int, ...]) -> Case:
     interface = Interface.from_faces(nodes[0], slave.faces()[:, ::-1], nodes[1], master.faces())
     ends = [plane[1].min(axis=0), np.minimum(plane[1].max(axis=0), 1.0)]
     domain = np.array([[ends[i][0], ends[j][1]] for i, j in ((0, 0), (1, 0), (1, 1), (0, 1))])
-    laid_out, pressure = (interface, np.vstack(plane), domain), strain * min(young)
-    return _scene(laid_out, layers, young, poisson, motion, pressure=pressure).case(seed=seed)
+    surfaces, pressure = (interface, np.vstack(plane), domain), strain * min(young)
+    return _scene(surfaces, layers, young, poisson, motion, pressure=pressure).case(seed=seed)
 
 
 def _draw_variants(draw: DrawFn, faces: tuple[int, ...]) -> Case:
@@ -94,15 +95,15 @@ _SLOPES = st.tuples(*[st.sampled_from([1, 2, 3, -5, 8, 13, -16, 20])] * 2)
 _BUMPS = st.sampled_from([0.0, 0.03, 0.06])
 
 
-def _tilted(slopes: SearchStrategy[tuple[int, ...]], most: int = 3) -> Callable[[DrawFn, tuple[int, ...]], Case]:
+def _tilt(slopes: SearchStrategy[tuple[int, ...]], most: int = 3) -> Callable[[DrawFn, tuple[int, ...]], Case]:
     def draw_case(draw: DrawFn, faces: tuple[int, ...]) -> Case:
         pairs = surface_pairs(same_domain=False, most=most, stretched=False, faces=faces, straight=True)
         pair, layers, young, poisson = draw(pairs), draw(_BOTH_LAYERS), draw(_YOUNG), draw(_POISSON)
         exponent, motion, seed = draw(solids.TILTED_STRAINS), draw(space_motions(furthest=16)), draw(samples.SEEDS)
         tilt, stiff, bump = draw(slopes), draw(solids.STIFF), draw(_BUMPS)
         strain = 2.0 ** -min(exponent, solids.SMALLEST_STRAIN.get(stiff, exponent))
-        laid_out, varied = pair.lay_out(), {"slopes": tilt, "stiff": stiff, "bump": bump}
-        return _scene(laid_out, layers, young, poisson, motion, strain=strain, **varied).case(seed=seed)
+        load: dict[str, Any] = {"strain": strain, "slopes": tilt, "stiff": stiff, "bump": bump}
+        return _scene(pair.lay_out(), layers, young, poisson, motion, **load).case(seed=seed)
 
     return draw_case
 
@@ -111,14 +112,14 @@ space_block_cases = _on_scene(_draw_blocks, "space_block_cases")
 space_matched_cases = _on_scene(_draw_matched, "space_matched_cases")
 space_dead_zone_cases = _on_scene(_draw_dead_zones, "space_dead_zone_cases")
 space_variant_cases = _on_scene(_draw_variants, "space_variant_cases")
-space_solid_cases = _on_scene(_tilted(_SLOPES), "space_solid_cases", uniform=False)
-space_closed_cases = _on_scene(_tilted(_CLOSED_SLOPES), "space_closed_cases", uniform=False)
+space_solid_cases = _on_scene(_tilt(_SLOPES), "space_solid_cases", uniform=False)
+space_closed_cases = _on_scene(_tilt(_CLOSED_SLOPES), "space_closed_cases", uniform=False)
 # Few points, so that few of them are near a kink.
-space_smooth_cases = _on_scene(_tilted(_CLOSED_SLOPES, most=2), "space_smooth_cases", uniform=False)
+space_smooth_cases = _on_scene(_tilt(_CLOSED_SLOPES, most=2), "space_smooth_cases", uniform=False)
 
 
 def _scene(
-    laid_out: tuple[Interface, FloatArray, FloatArray],
+    surfaces: tuple[Interface, FloatArray, FloatArray],
     layers: tuple[list[float], list[float]],
     young: tuple[float, float],
     poisson: tuple[float, float],
@@ -132,7 +133,7 @@ def _scene(
     rigid: bool = False,
 ) -> Scene:
     """Return the two blocks, pressed by an approach, or by a pressure: on a larger master no approach is uniform."""
-    interface, plane, domain = laid_out
+    interface, plane, domain = surfaces
     if slopes is not None:  # Off the lattice no slave node lies over a master edge.
         plane = plane.copy()
         plane[: interface.n_slave_nodes] += np.array([3 / 7, 5 / 11]) / 8

@@ -18,8 +18,9 @@ from hypothesis.strategies import DrawFn, SearchStrategy
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case, random_source
 from contactverif.contract.interface import TRIANGLE, Interface, Surface
+from contactverif.problems.space_blocks import SpaceMotion
 from contactverif.strategies import samples
-from contactverif.strategies.surfaces import SpaceMotion, surface_grids, surface_pairs
+from contactverif.strategies.surfaces import surface_grids, surface_pairs
 
 _SLAVE = st.lists(st.sampled_from([1.0, 2.0, 1.5]), min_size=1, max_size=4)
 _SIXTEENTHS = st.integers(1, 11)  # The slope of a tilted slave: 0.06 to 0.6 rad.

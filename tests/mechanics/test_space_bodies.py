@@ -57,16 +57,16 @@ def test_a_linear_displacement_has_one_stress_and_no_forces_inside(corners: int)
     gradient = np.array([[2.0, 0.5, -1], [0.25, -1, 0.5], [1, 0.125, 0.5]]) / 64
     local = body.nodes @ body.frame
     q = (local @ gradient.T)[body.contact_nodes].reshape(-1)
-    held = np.ones(body.nodes.shape, bool)
-    held[body.contact_nodes] = False
-    imposed = np.where(held, local @ gradient.T, 0.0)
-    condensed = condense(replace(body, fixed=held, imposed=imposed))
+    fixed = np.ones(body.nodes.shape, bool)
+    fixed[body.contact_nodes] = False
+    imposed = np.where(fixed, local @ gradient.T, 0.0)
+    condensed = condense(replace(body, fixed=fixed, imposed=imposed))
     strain = (gradient + gradient.T) / 2
     lame, shear = lame_parameters(body.young, body.poisson)
     stress = lame * np.trace(strain) * np.eye(3) + 2 * shear * strain
     voigt = stress[[0, 1, 2, 1, 0, 0], [0, 1, 2, 2, 2, 1]]
     assert np.abs(condensed.stresses(q) - voigt).max() <= 1e4 * UNIT_ROUNDOFF * np.abs(voigt).max()
-    free = replace(body, fixed=np.zeros(held.shape, bool))
+    free = replace(body, fixed=np.zeros(fixed.shape, bool))
     inside = np.setdiff1d(np.arange(len(body.nodes)), np.unique(_border(body)))
     forces = (assemble_stiffness(free)[0] @ (local @ gradient.T).reshape(-1)).reshape(-1, 3)
     assert np.abs(forces[inside]).max(initial=0.0) <= 1e4 * UNIT_ROUNDOFF * np.abs(forces).max()

@@ -59,17 +59,17 @@ def test_the_compliance_of_a_layer_against_collocation() -> None:
         slope = np.outer(signs, 1 / signs) / gaps
         slope -= np.diag(slope.sum(axis=1))
         slope *= 2 / height
-        q, one = np.hypot(*(pi / np.array(box.sides))), np.eye(n + 1)
+        q, unit = np.hypot(*(pi / np.array(box.sides))), np.eye(n + 1)
         matrix = np.block(
             [
-                [shear * slope @ slope - (lame + 2 * shear) * q**2 * one, (lame + shear) * slope],
-                [-(lame + shear) * q**2 * slope, (lame + 2 * shear) * slope @ slope - shear * q**2 * one],
+                [shear * slope @ slope - (lame + 2 * shear) * q**2 * unit, (lame + shear) * slope],
+                [-(lame + shear) * q**2 * slope, (lame + 2 * shear) * slope @ slope - shear * q**2 * unit],
             ]
         )
         right = np.zeros(2 * n + 2)
-        sheared, pressed = np.hstack([slope, one]), np.hstack([-lame * q**2 * one, (lame + 2 * shear) * slope])
-        held = np.concatenate([np.zeros(n + 1), one[n]])
-        for row, equation, value in ((0, sheared[0], 0), (n, sheared[n], 0), (n + 1, pressed[0], -1), (-1, held, 0)):
+        sheared, pressed = np.hstack([slope, unit]), np.hstack([-lame * q**2 * unit, (lame + 2 * shear) * slope])
+        lowest = np.concatenate([np.zeros(n + 1), unit[n]])
+        for row, equation, value in ((0, sheared[0], 0), (n, sheared[n], 0), (n + 1, pressed[0], -1), (-1, lowest, 0)):
             matrix[row], right[row] = equation, value
         expected.append(-np.linalg.solve(matrix, right)[n + 1])
     for penalty in (1e2, 1e4):

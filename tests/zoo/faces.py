@@ -484,7 +484,7 @@ def _by_corners(view, codes):
     return gauss_points(view, codes, 3 if view.slave.shape[-2] == view.master.shape[-2] == 3 else 6)
 
 
-def _solved(change, **statements):
+def change_all(change, **statements):
     """Return the factory of springs on triangles and quadrilaterals with changed points."""
     return says(by_rule(lambda view, codes: change(_by_corners(view, codes), view)), **statements)
 
@@ -536,18 +536,18 @@ def _guard(points, view):
 # (name, caught by, factory)
 for _row in (
     ("nodes said to pass the solved patch test", "patch.flat.solve", says(NTS_AR, flat=True)),
-    ("points that lean to a corner of matching faces", "patch.flat.normal.solve", _solved(_lean)),
-    ("equal corners between blocks of any stiffness", "patch.variants", _solved(_equal_corners)),
+    ("points that lean to a corner of matching faces", "patch.flat.normal.solve", change_all(_lean)),
+    ("equal corners between blocks of any stiffness", "patch.variants", change_all(_equal_corners)),
     ("quarters said to end where the master ends", "patch.dead-zone", says(QUARTERS, overhang=True)),
     ("quarters said to bear any share", "hard.dead-zone", says(QUARTERS, overhang=True)),
-    ("points that lean to a corner of coarse faces", "hard.contrast", _solved(_lean)),
-    ("points that lean to a corner under stiff springs", "hard.stiff", _solved(_lean)),
-    ("bodies that press each other without a load", "hard.zero-load", _solved(_press)),
+    ("points that lean to a corner of coarse faces", "hard.contrast", change_all(_lean)),
+    ("points that lean to a corner under stiff springs", "hard.stiff", change_all(_lean)),
+    ("bodies that press each other without a load", "hard.zero-load", change_all(_press)),
     ("no turn of the normal, solved", "newton.order", _in_tangent(_frozen("normal"))),
     ("no change of the gap, to the end", "newton.history", _in_tangent(_frozen("gap"))),
-    ("absolute guard in a step", "newton.units", _solved(_guard)),
-    ("areas that shrink where faces are inclined", "patch.curved", _solved(_project)),
-    ("twice the pressure on quadrilaterals", "accuracy.egg-box", _solved(_twice_on_quadrilaterals, converges=True)),
-    ("penetration of a point contact capped", "accuracy.hertz", _solved(_cap, converges=True)),
+    ("absolute guard in a step", "newton.units", change_all(_guard)),
+    ("areas that shrink where faces are inclined", "patch.curved", change_all(_project)),
+    ("twice the pressure on quadrilaterals", "accuracy.egg-box", change_all(_twice_on_quadrilaterals, converges=True)),
+    ("penetration of a point contact capped", "accuracy.hertz", change_all(_cap, converges=True)),
 ):  # fmt: skip
     add(*_row)
