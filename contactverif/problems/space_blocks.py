@@ -128,14 +128,16 @@ def space_blocks(
         "compliance" (2,) and "pressure" or "approach".
     """
     n_slave, axes, scale = interface.n_slave_nodes, motion.axes, motion.scale
-    low, high = plane.min(axis=0), plane.max(axis=0)
-    around = np.array([low, [high[0], low[1]], high, [low[0], high[1]]])
-    whole, inside = (uniform_surface_weights(interface, plane, part) for part in (around, domain))
+    whole, beside = np.zeros((2, len(plane)))  # The loads of the far side, and of what is beside the other surface.
+    if pressure is not None:
+        low, high = plane.min(axis=0), plane.max(axis=0)
+        around = np.array([low, [high[0], low[1]], high, [low[0], high[1]]])
+        whole = pressure * scale**2 * uniform_surface_weights(interface, plane, around)
+        beside = whole - pressure * scale**2 * uniform_surface_weights(interface, plane, domain)
     places, heights = (np.split(part, [n_slave]) for part in (plane, interface.nodes[:, 2]))
     bodies, compliances, middle = [], [], domain.mean(axis=0)
     if lowered is None:
         lowered = approach if approach is not None else (pressure or 0.0) / penalty / scale
-    beside = np.split((pressure or 0.0) * scale**2 * (whole - inside), [n_slave])
     for index, (surface, start) in enumerate(((interface.slave, 0), (interface.master, n_slave))):
         faces, flat, sign = surface.faces - start, places[index], (1.0, -1.0)[index]
         n, rigid = len(flat), bool(index and rigid_master)
@@ -152,9 +154,9 @@ def space_blocks(
         elif approach is not None:
             fixed[far, 2], imposed[far, 2] = True, -(approach + (flat - middle) @ tilt) * scale
         else:
-            load[far, 2] = -(pressure or 0.0) * scale**2 * whole[:n_slave]
+            load[far, 2] = -whole[:n_slave]
         if not rigid:
-            load[:n, 2] += sign * beside[index]
+            load[:n, 2] += sign * beside[start : start + n]
         body = Body(
             nodes=motion(nodes),
             cells=np.zeros((0, 8), np.int64) if rigid else extrude(faces, n, len(levels) - 1),
