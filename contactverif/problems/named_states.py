@@ -55,6 +55,22 @@ def _tilt_faces(name: str, corners: int) -> Case:
     return Case(interface, np.vstack([tilted, master]).reshape(-1), 16.0, name=name)
 
 
+def _move_diagonals() -> Case:
+    """Return crossed-diagonals with the slave moved by 1/4 past the border of the master."""
+    case = named_case("crossed-diagonals")
+    positions = case.positions + np.outer(np.arange(len(case.positions)) < len(_SQUARE), [0.25, 0.0, 0.0])
+    return Case(case.interface, positions.reshape(-1), case.penalty, name="moved-diagonals")
+
+
+def _slide_faces() -> Case:
+    """Return a triangle with a slope of 1/2 below two others; the parameter "path" moves it by 1 over their edge."""
+    slave = np.array([[0.5, 0.25, -0.5], [1.5, 0.25, -1.0], [0.5, 1.25, -0.5]])
+    master = np.array([[0.0, 0, 0], [4, 0, 0], [4, 4, 0], [0, 4, 0]])
+    interface = Interface.from_faces(slave, [[0, 2, 1]], master, _FIRST_DIAGONAL)
+    path = np.outer(np.arange(len(interface.nodes)) < len(slave), [0.0, 1.0, 0.0])
+    return Case(interface, interface.nodes.reshape(-1), 16.0, {"path": path.reshape(-1)}, name="sliding-faces")
+
+
 _LENGTHS: dict[str, tuple[Sequence[float], Sequence[float]]] = {
     "a1": ([2, 2], [4]),
     "a2": ([1, 1, 2, 4], [8]),  # graded, on one rigid segment
@@ -166,6 +182,8 @@ _OTHERS: dict[str, Callable[[], Case]] = {
     "crossed-diagonals": partial(_cross_cuts, "crossed-diagonals", TRIANGLE),
     "tilted-faces": partial(_tilt_faces, "tilted-faces", TRIANGLE),
     "crossed-halves": partial(_cross_cuts, "crossed-halves", QUADRILATERAL),
+    "moved-diagonals": _move_diagonals,
+    "sliding-faces": _slide_faces,
     "tilted-halves": partial(_tilt_faces, "tilted-halves", QUADRILATERAL),
 }
 FLAT_NAMES: tuple[str, ...] = tuple(_FLAT)

@@ -8,10 +8,10 @@ Mortar: the gap of slave node i is G_i / W_i with G_i = ∫ N_i g and W_i = ∫ 
 pressure −ε̂ G_i / W_i, where that is above 0, acts with the same shape function. So a uniform pressure is exact, and
 force and moment balance at each point of the integrals.
 
-Quarters, as the outlook of Zavarise & De Lorenzis (2009) describes: a virtual slave node at the centre of each of four
-parts of a slave face has the gap to the master face opposite. It presses its part of the slave by the shape functions
-at the node. The same pressure acts on every master face under the part, integrated with the master's shape functions.
-On triangles both sides balance where the master covers the part; on warped quadrilaterals they do not.
+Quarters (ours; `face_ppt` is the method of the paper): a virtual slave node at the centre of each of four parts of a
+slave face has the gap to the master face opposite, along the slave's normal. It presses its part of the slave by the
+shape functions at the node. The same pressure acts on every master face under the part, integrated with the master's
+shape functions. On triangles both sides balance where the master covers the part; on warped quadrilaterals they do not.
 
 Nodes: a spring at each slave node acts along the normal of the master face that it stands on. The foot of a node is the
 point of a master face straight below it; of the faces that have one, the nearest counts, if its gap is at most
@@ -359,16 +359,12 @@ def _unit_master(corners: Array, shares: FloatArray, codes: IntArray) -> Array:
     return flatten_pushes(points.push(points.weight)[1])
 
 
-def vts_ppt_3d(*, penalty: float) -> FaceQuarters:
-    """Virtual slave nodes at the centres of four equal parts of each triangle, pressing on all master faces below.
-
-    Source: Zavarise & De Lorenzis, Int. J. Numer. Meth. Engng 79 (2009) 379–416, Section 8.
-    """
-    source = "Zavarise & De Lorenzis, Int. J. Numer. Meth. Engng 79 (2009) 379–416, the outlook"
+def press_along_slave(penalty: float) -> FaceQuarters:
+    """Return `vts_ppt_3d` with everything along the slave's normal (ours)."""
     # A part that overhangs the master presses the slave with all its area, and the master with what is covered.
     witnesses = {**SURFACE_TRAITS.evidence.witnesses, "balance": "tilted-faces"}
     traits = SURFACE_TRAITS.revise(
-        gap="slave normal", conserves_force=False, conserves_moment=False, witnesses=witnesses, source=source
+        gap="slave normal", conserves_force=False, conserves_moment=False, witnesses=witnesses, source="here"
     )
     return FaceQuarters(traits, check_penalty(penalty))
 

@@ -134,7 +134,7 @@ def find_face_cells(
         for place in range(n_facing):
             m = members[place]
             view_face(on_master, x, master[m], origin, axes, True)
-            n_corners = _clip_face(on_slave, on_master, corners[count], places, codes)
+            n_corners = clip_face(on_slave, on_master, corners[count], places, codes)
             if n_corners > 0:
                 row = table[count - first]
                 _set_plane(row, places[len(on_slave) % 2], n_corners, on_master)
@@ -151,10 +151,10 @@ def _collect_facing(members: IntArray, masters: Fields, question: FloatArray, tr
     """Write the master faces that may overlap a slave face, in ascending order, and return how many."""
     x, master, origin, axes, on_master = masters
     n_facing = 0
-    for place in range(_collect_boxes(members, tree, origin, axes, question)):
+    for place in range(collect_boxes(members, tree, origin, axes, question)):
         m = members[place]
         view_face(on_master, x, master[m], origin, axes, True)
-        if _may_overlap(question, on_master):
+        if may_overlap(question, on_master):
             i = n_facing
             while i > 0 and members[i - 1] > m:
                 members[i] = members[i - 1]
@@ -222,7 +222,7 @@ def view_face(
 
 
 @compile_part
-def _may_overlap(question: FloatArray, master: FloatArray) -> bool:
+def may_overlap(question: FloatArray, master: FloatArray) -> bool:
     """Return whether the box of a master face, seen in the plane, meets that of the slave, and faces it."""
     for axis in range(2):
         first, last = master[0, axis], master[0, axis]
@@ -238,7 +238,7 @@ def _may_overlap(question: FloatArray, master: FloatArray) -> bool:
 
 
 @compile_part
-def _clip_face(slave: FloatArray, master: FloatArray, corners: IntArray, places: FloatArray, codes: IntArray) -> int:
+def clip_face(slave: FloatArray, master: FloatArray, corners: IntArray, places: FloatArray, codes: IntArray) -> int:
     """Clip the master face by the slave face; write the corners of what is left, and return their number, 0 for none.
 
     Of both halves of `places` and `codes` one is written from the other, once for each slave edge: the result is in
@@ -386,7 +386,7 @@ def _write_boxes(order: IntArray, nodes: FloatArray, boxes: FloatArray) -> None:
 
 
 @compile_part
-def _collect_boxes(members: IntArray, tree: Tree, origin: FloatArray, axes: FloatArray, question: FloatArray) -> int:
+def collect_boxes(members: IntArray, tree: Tree, origin: FloatArray, axes: FloatArray, question: FloatArray) -> int:
     """Write the numbers of boxes into `members`, all that meet a question and some more; return how many.
 
     The question (2, 3) holds the points whose components along the `axes` (3, 3), seen from the origin, are between its
@@ -435,10 +435,10 @@ def find_boxes_at(points: FloatArray, tree: Tree) -> tuple[IntArray, IntArray]:
     axes, question, members = np.eye(3), np.zeros((2, 3)), np.empty(len(tree[0]), np.int64)
     counts = np.empty(len(points), np.int64)
     for i in range(len(points)):
-        counts[i] = _collect_boxes(members, tree, points[i], axes, question)
+        counts[i] = collect_boxes(members, tree, points[i], axes, question)
     point, box, count = np.empty(counts.sum(), np.int64), np.empty(counts.sum(), np.int64), 0
     for i in range(len(points)):
-        for place in range(_collect_boxes(members, tree, points[i], axes, question)):
+        for place in range(collect_boxes(members, tree, points[i], axes, question)):
             point[count], box[count] = i, members[place]
             count += 1
     return point, box
