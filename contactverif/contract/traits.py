@@ -83,8 +83,8 @@ class Promises:
         The forces on slave and master balance at any tilt and curvature; so do their moments.
     continuity : Literal['C0', 'C1', 'jumps'] | None
         The smoothness of the forces while a slave slides over the vertices of a master that no line along the normal
-        meets twice: ``"C0"``, forces are continuous; ``"C1"``, their slopes are too where nothing opens; ``"jumps"``,
-        forces jump, which needs a witness.
+        meets twice, in space over the edges of a flat one: ``"C0"``, forces are continuous; ``"C1"``, their slopes are
+        too where nothing opens; ``"jumps"``, forces jump, which needs a witness.
     local : bool | None
         The forces between a slave and the master segments that it touches do not depend on where other nodes of the
         master are.

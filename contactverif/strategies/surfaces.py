@@ -263,6 +263,29 @@ def surface_cases(
     return _tilted_states(surface_pairs(faces=faces), space_motions(), smooth=False)
 
 
+_GRADES = st.integers(-8, 8)  # Sixteenths.
+_WAYS = st.sampled_from([(0.25, 0.0), (0.0, 0.25), (-0.25, 0.0), (0.0, -0.25), (0.1875, 0.125), (-0.125, 0.1875)])
+
+
+@random_source("contactverif.strategies.surfaces.sliding_surface_cases")
+@samples.on_own_meshes
+def sliding_surface_cases(draw: DrawFn, faces: tuple[int, ...] = (TRIANGLE,)) -> Case:
+    """Return plane, tilted slaves that slide over the edges of a flat, larger master, and penetrate it everywhere.
+
+    The parameter "path" (n_unknowns,) holds the way of each node, a length each, as in `translations.sliding_cases`.
+    """
+    pair = draw(surface_pairs(same_domain=False, most=3, stretched=False, faces=faces))
+    grades, depth, way = (draw(_GRADES), draw(_GRADES)), draw(_QUARTERS), draw(_WAYS)
+    motion, penalty, seed = draw(space_motions()), draw(samples.PENALTIES), draw(samples.SEEDS)
+    interface, plane, domain = pair.lay_out()
+    current, slave = interface.nodes.copy(), np.arange(interface.n_nodes) < interface.n_slave_nodes
+    rise = (plane[slave] - domain.mean(axis=0)) @ np.array(grades) / 16
+    current[slave, 2] += rise - rise.max() - depth / 64
+    z = motion(current).reshape(-1)
+    path = motion(current + np.outer(slave, [*way, 0.0])).reshape(-1) - z
+    return Case(interface.at(interface.nodes * motion.scale), z, penalty, {"path": path}, seed)
+
+
 @random_source("contactverif.strategies.surfaces.tilted_surfaces.smooth_surface_cases")
 def smooth_surface_cases(
     interface: Interface | None = None, faces: tuple[int, ...] = (TRIANGLE,)

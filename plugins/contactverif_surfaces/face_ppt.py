@@ -43,7 +43,7 @@ from typing import Any, Literal
 import numpy as np
 from scipy import sparse
 
-from contactverif.compiler import compile_inline, compile_kernel, compile_part
+from contactverif.compiler import compile_inline, compile_kernel, compile_part, constant
 from contactverif.contract.arrays import Array, FloatArray, IntArray
 from contactverif.contract.formulation import ContactPoints, Pairing, check_penalty, check_tau, choose
 from contactverif.contract.interface import Interface
@@ -72,6 +72,7 @@ from contactverif_surfaces.face_ppt_search import (
 )
 from contactverif_surfaces.face_search import MOST_CORNERS, set_axes, view_face
 
+NONE = constant(0)
 SCANNED = 64  # A row with at most so many entries is scanned for a column; in a longer one the column is bisected for.
 # One point in the middle of a triangle integrates linear shape functions; six serve those of quadrilaterals.
 RULES = {3: (np.full((1, 3), 1 / 3), np.ones(1)), 4: GAUSS[6]}
@@ -160,7 +161,7 @@ def _list_members(members: NumberArray, starts: IntArray, faces: Fields, pairing
     return most
 
 
-@compile_inline
+@compile_part
 def _see_face(at_face: IntArray, places: Array, members: Fields, face: IntArray, corners: Array) -> None:
     """Write where the nodes of a face are among the members of a part, and their coordinates there."""
     numbers, start, size = members
@@ -385,7 +386,7 @@ def _add_cell(
                     by_row[3 * at[2, corner] + 1] -= share * push * v_s
 
 
-@compile_inline
+@compile_part
 def _move_corner(by_row: Array, at_slave: IntArray, shares: FloatArray, by_s: float, by_t: float) -> None:
     for node in range(len(shares)):
         by_row[3 * at_slave[node]] += shares[node] * by_s
@@ -398,7 +399,7 @@ def _add_forces(forces: Array, rooms: Fields, x: Array, faces: Fields, pairing: 
     pushes, axes, members, starts = rooms[0][0], rooms[1][0], pairing[5], pairing[6]
     for state in range(len(x)):
         for place in range(len(pairing[1])):
-            _press_part(rooms, x[state], faces, pairing, rules, place, 0)
+            _press_part(rooms, x[state], faces, pairing, rules, place, NONE)
             for r in range(starts[place + 1] - starts[place]):
                 for axis in range(3):
                     forces[state, members[starts[place] + r], axis] += pushes[r] * axes[2, axis]
@@ -536,7 +537,7 @@ def vts_ppt_3d(
     passes the flat patch test. Where surfaces are tilted, the slave is pushed by areas of its own, and the master by
     projected ones: neither force nor moment is conserved, and forces jump where a part crosses an edge of the master.
 
-    With ``normal="slave"`` (ours) everything is along the normal of the slave face, on triangles alone, and `tau` is not
+    With ``normal="slave"`` (ours) everything is along the normal of the slave face, on triangles alone. `tau` is not
     used: a virtual slave node needs a master face opposite.
 
     Source: Zavarise & De Lorenzis (2009), Boxes 1–3, after their Section 6.3.

@@ -8,7 +8,7 @@ part, and corners x_k
 A triangle has three parts at its corners and one in its middle, a quadrilateral the quarters of its parameter square.
 There both are sums over 2 × 2 Gauss points with weights |∂s × ∂t|, so they do not depend on who sees the face.
 
-1. The partner m of V is the nearest face of the master, back faces counted. A quadrilateral is searched as four triangles
+1. The partner m of V is the nearest face of the master, back faces counted. A quadrilateral is taken for four triangles
    about the mean of its corners. Squared distances tie if they differ by 64 u d D or less, where D is the distance of
    the farthest corner. Of such faces that one counts past which the foot of V lies least, then the lowest number.
 2. The part faces m if the normal of its face has a negative product with the normal n of m. V lies on the surface
@@ -93,7 +93,7 @@ def dot(a: Arm, b: Arm) -> float:
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-@compile_inline
+@compile_part
 def combine(face: Array, shares: FloatArray) -> Arm:
     """Return the sum of shares (n_corners,) × corners (n_corners, 3)."""
     x, y, z = 0.0 * face[0, 0], 0.0 * face[0, 0], 0.0 * face[0, 0]

@@ -15,7 +15,7 @@ from contactverif.contract.property import WITH_BARRIER, Finding, Measurement, P
 from contactverif.contract.subject import Call, Subject
 from contactverif.contract.traits import Traits
 from contactverif.strategies import smooth_cases
-from contactverif.strategies.surfaces import smooth_surface_cases, surface_cases
+from contactverif.strategies.surfaces import sliding_surface_cases, smooth_surface_cases, surface_cases
 from contactverif.strategies.translations import sliding_cases
 from contactverif_properties import roundoff
 from contactverif_properties.applicability import refuse_unstated, tangent_error
@@ -239,6 +239,7 @@ def _refuse_unstated_continuity(traits: Traits) -> str:
     family="invariants",
     quantities=(FORCE, SLOPE),
     cases=Cases.random(sliding_cases),
+    cases_in_space=Cases.random(sliding_surface_cases),
     promise=lambda traits: None if traits.promises.continuity is None else traits.promises.continuity != "jumps",
     applicable=_refuse_unstated_continuity,
 )
@@ -247,7 +248,7 @@ def continuity(case: Case, subject: Subject) -> Measurement:
 
     **Question.** A slave slides along a bent master by the length of one of its segments, so that each of its points
     passes about one vertex. Do the forces change continuously, or with a continuous slope, as the trait `continuity`
-    says?
+    says? In space a tilted slave slides over the edges of a flat master.
 
     **Why it matters.** Where a force jumps, a load between both values has no equilibrium: Newton's method runs in
     circles between two pairings. Friction and dynamics make a noise there.
@@ -264,7 +265,7 @@ def continuity(case: Case, subject: Subject) -> Measurement:
     Where a length of the slave lies parallel to the master and leaves it in one moment, the force of every law that
     does not pull has a bend; on such a way the slope is not asked.
 
-    **Undecided.** Never. The slave stays far from the free ends of the master.
+    **Undecided.** Never. The slave stays off the free ends of the master.
     """
     formulation, interface, way = subject.for_case(case), case.interface, case.parameters["path"]
 
