@@ -200,7 +200,7 @@ def _make_kernels() -> Iterator[str]:
             "chen-hisada",
         ),
         *("mortar", "mortar:normals=averaged", "mortar-dual", "mortar-lm", "mortar-dual-lm", "mortar-two-half-pass"),
-        *("sts-3d", "mortar-3d", "vts-cell-3d", "vts-ppt-3d", "nts-3d", "nts-ar-3d"),
+        *("sts-3d", "mortar-3d", "vts-cell-3d", "vts-ppt-3d", "vts-ppt-balanced-3d", "nts-3d", "nts-ar-3d"),
     ]
     ids = ["balance.force", "patch.flat.transmission", "mirror", "tangent.directional", "stability.sweep"]
     cases = {dim: list(_drawn(load_properties(ids), dim, 32)) for dim in (2, 3)}

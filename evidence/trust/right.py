@@ -118,7 +118,7 @@ def count_stranger(key: str) -> list[str]:
 
 
 # Formulations on faces.
-ON_FACES = ("sts-3d", "mortar-3d", "vts-cell-3d", "vts-ppt-3d", "nts-3d", "nts-ar-3d")
+ON_FACES = ("sts-3d", "mortar-3d", "vts-cell-3d", "vts-ppt-3d", "vts-ppt-balanced-3d", "nts-3d", "nts-ar-3d")
 EXAMPLES_FACES = 700  # Random cases of each property and formulation. A list of cases is asked once.
 
 

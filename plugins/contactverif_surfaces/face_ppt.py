@@ -1,6 +1,6 @@
 """VTS-PPT on faces, compiled: a virtual slave node in each part of a slave face, pressing on all that lies under it.
 
-`face_ppt_search` finds the partner m of each virtual slave node V, and the faces under its part. With n, the unit normal
+`face_ppt_search` finds the partner m of each virtual slave node V, and the faces under its part. With the unit normal n
 of m, the shape functions M_k of m at the foot of V (unclipped), and the height g of V over m along n,
 
     F = ε̂ g A          slave nodes get F N̄_k n          master nodes get −F M_k n, where the part has no cells (Eq. 6)
@@ -9,29 +9,22 @@ Otherwise each face j carries W_jk = ∫ N_k over its overlap with the part, in 
 
     printed: master nodes get −ε̂ g W_jk n          balanced (ours), or m alone: −F W_jk/S n
 
-Over a cell N_k of a triangle is linear, and the integral exact. On a quadrilateral it has 6 Gauss points on each
-triangle between the middle of the cell and two corners, as `cell_points.gauss_points`.
+Over a triangle N_k is linear, and the integral exact. On a quadrilateral it has 6 Gauss points on each triangle between
+the middle of the cell and two corners, as `cell_points.gauss_points`.
 
-The tangent. All numbers above are functions of the coordinates y = (s, t, h) of nodes in the frame (e_1, e_2, n) of m,
-and a turn about n does not change them. With the plane vectors γ_k of the nodes of m, by which n turns,
+All sizes of forces are functions of the coordinates y = (s, t, h) of nodes along the axes of m. A turn about n does not
+change them. With the slopes γ_k of the shape functions in the middle of m, δn = −Σ γ_k (n · δx_k), and such a size Q with
+the derivatives Q_y changes by
 
-    δn = −Σ γ_k (n · δx_k)          γ_1 = D^1, γ_2 = D^2, γ_0 = −γ_1 − γ_2, dual to the edges D_1, D_2 at corner 0
+    δQ = Σ Q_y · δx + (Σ γ_k (n · δx_k)) · Σ (h Q_st − (s, t) Q_h)          δ(Q n) = n δQ + Q δn
 
-(dual to the diagonals on a quadrilateral), a function Q of the coordinates with the derivatives Q_y changes by
+With the weights J = |∂s × ∂t| w of the Gauss points of a part, and with c = (−Σ h_k ∇M_k, 1),
 
-    δQ = Σ Q_y · δx + (Σ γ_k (n · δx_k)) · Σ (h Q_st − (s, t) Q_h)
+    δN̄_k = Σ δJ (N_k − N̄_k)/A     δV = Σ N̄_k δy_k + Σ y_k δN̄_k     r = δV − Σ M_k δy_k     δM_k = ∇M_k · r     δg = c · r
 
-A force Q n changes by n δQ + Q δn. With q = A m̂, the Gauss weights J = |∂s × ∂t| w of a part and c = (−Σ h_k ∇M_k, 1),
-
-    δN̄_k = Σ δJ (N_k − N̄_k)/A          δV = Σ N̄_k δy_k + Σ y_k δN̄_k
-    δM_k = ∇M_k · r          δg = c · r          r = δV − Σ M_k δy_k
-
-and an integral over a cell with corners P by its quadrature: a point p with the weight w has
-
-    δ(w N_k) = N_k δw + w ∇N_k · (δp − Σ N_l δy_l)
-
-A corner P where an edge u of the part and an edge v of the face cross, u × v = D, moves by what lies there of either
-edge: δP = (v (u × δa) − u (v × δb))/D.
+In an integral over a cell the point p with the weight w changes by δ(w N_k) = N_k δw + w ∇N_k · (δp − Σ N_l δy_l). A
+corner where an edge u of the part and an edge v of the face cross moves by what lies there of either edge, δa and δb:
+by (v (u × δa) − u (v × δb))/(u × v).
 
 Rules for the next editor: differences come before products, and nothing is allocated in a loop. Numbers are real or
 complex in the residual.
@@ -180,7 +173,7 @@ def _press_part(rooms: Fields, x: Array, faces: Fields, pairing: Fields, rules: 
     (slave, master), (home, parts, ranges, cells, codes, members, starts) = faces, pairing
     (table, rule, balanced, penalty), (out, of_part, of_cell) = rules, rooms
     pushes, by_nodes, places, levers = out
-    axes, on_slave, on_home, part, mean, shapes, slopes, by_area, by_foot, by_mean, by_gap, by_factor, at = of_part
+    axes, on_slave, on_home, _, mean, shapes, slopes, by_area, by_foot, by_mean, by_gap, by_factor, at = of_part
     p, of_members = parts[place], (members, starts[place], starts[place + 1] - starts[place])
     face, m, on_face, size = slave[p // N_PARTS], master[home[p]], of_cell[0], of_members[2]
     area, centre, gap = _place_node(of_part, x, face, m, table, p % N_PARTS)
@@ -190,11 +183,7 @@ def _press_part(rooms: Fields, x: Array, faces: Fields, pairing: Fields, rules: 
     pushes[:size], by_nodes[:size, :width], levers[:size] = 0.0, 0.0, 0.0
     if width > 0:
         _differentiate_part(of_part, centre, area, table, p % N_PARTS, width)
-        of_cell[5][:] = 1 / len(m)  # The slopes in the middle of m are the vectors γ.
-        middle = combine(on_home, of_cell[5])
-        set_shapes(of_cell[5], of_cell[6], on_home, middle[0], middle[1])
-        for k in range(len(m)):
-            levers[at[1, k], 0], levers[at[1, k], 1] = of_cell[6][k, 0], of_cell[6][k, 1]
+        _set_levers(levers, on_home, at[1], of_cell)
     for k in range(len(face)):
         pushes[at[0, k]] = force * mean[k]
         for q in range(width):
@@ -227,6 +216,17 @@ def _press_part(rooms: Fields, x: Array, faces: Fields, pairing: Fields, rules: 
         for q in range(width):
             by_nodes[row, q] = factor * by_nodes[row, q] + pushes[row] * by_factor[q]
         pushes[row] *= factor
+
+
+@compile_part
+def _set_levers(levers: Array, face: Array, at_face: IntArray, of_cell: Fields) -> None:
+    """Write the vectors γ: the slopes in the middle of m."""
+    shapes, slopes = of_cell[5], of_cell[6]
+    shapes[:] = 1 / len(face)
+    middle = combine(face, shapes)
+    set_shapes(shapes, slopes, face, middle[0], middle[1])
+    for k in range(len(face)):
+        levers[at_face[k], 0], levers[at_face[k], 1] = slopes[k, 0], slopes[k, 1]
 
 
 @compile_part
@@ -328,7 +328,7 @@ def _add_cell(
     """Add the integrals of shape functions over a cell, and their derivatives, to the rows of the face's nodes."""
     (face, cell, by_corner, by_middle, means, shapes, slopes), (places, weights) = of_cell, rule
     part, at = of_part[3], of_part[12]
-    n, n_face, n_part = _place_cell(cell, part, face, codes), len(face), len(part)
+    n, n_face = _place_cell(cell, part, face, codes), len(face)
     m_s, m_t, total = _place_middle(cell, n, n_face == 3)
     by_corner[:, :n], by_middle[:] = 0.0, 0.0
     for v in range(n):
@@ -354,36 +354,53 @@ def _add_cell(
                 by_corner[k, v, axis] += means[k] * by_a
                 by_corner[k, w, axis] += means[k] * by_b
                 by_middle[k, axis] -= means[k] * (by_a + by_b)
-    for v in range(n if width > 0 and total.real > 0 else 0):
+    if width > 0 and total.real > 0:
+        _move_middle(of_cell, n, (m_s, m_t, total))
+    for v in range(n if width > 0 else 0):
+        for k in range(n_face):
+            by_s, by_t = by_corner[k, v, 0], by_corner[k, v, 1]
+            _move_cell_corner(by_nodes[at[2, k]], at, part, face, shares, codes[v], by_s, by_t)
+
+
+@compile_part
+def _move_middle(of_cell: Fields, n: int, middle: tuple[float, float, float]) -> None:
+    """Add derivatives by the middle of a cell to those by its corners."""
+    (_, cell, by_corner, by_middle, _, _, _), (m_s, m_t, total) = of_cell, middle
+    for v in range(n):
         w = (v + 1) % n
         e_s, e_t = cell[w, 0] - cell[v, 0], cell[w, 1] - cell[v, 1]
         off_s, off_t = (cell[v, 0] + cell[w, 0]) / 2 - m_s, (cell[v, 1] + cell[w, 1]) / 2 - m_t
-        for k in range(n_face):
+        for k in range(len(by_middle)):
             pull = 4 * (by_middle[k, 0] * off_s + by_middle[k, 1] * off_t) / total
             for axis, edge in ((0, e_s), (1, e_t)):
                 half = (e_s * e_s + e_t * e_t) / total * by_middle[k, axis]
                 by_corner[k, v, axis] += half - pull * edge
                 by_corner[k, w, axis] += half + pull * edge
-    for v in range(n if width > 0 else 0):
-        i, j = codes[v, 0], codes[v, 1]
-        end, after = (i + 1) % n_part, (j + 1) % n_face
-        for k in range(n_face):
-            by_row, by_s, by_t = by_nodes[at[2, k]], by_corner[k, v, 0], by_corner[k, v, 1]
-            if j < 0:
-                _move_corner(by_row, at[0], shares[n_part - 1 - i], by_s, by_t)
-            elif i < 0:
-                by_row[3 * at[2, j]] += by_s
-                by_row[3 * at[2, j] + 1] += by_t
-            else:
-                on_part, on_face, turn = _cross_edges(part, face, i, j)
-                u_s, u_t = part[end, 0] - part[i, 0], part[end, 1] - part[i, 1]
-                v_s, v_t = face[after, 0] - face[j, 0], face[after, 1] - face[j, 1]
-                pull, push = (by_s * v_s + by_t * v_t) / turn, (by_s * u_s + by_t * u_t) / turn
-                for corner, share in ((i, 1 - on_part), (end, on_part)):
-                    _move_corner(by_row, at[0], shares[n_part - 1 - corner], -share * pull * u_t, share * pull * u_s)
-                for corner, share in ((j, 1 - on_face), (after, on_face)):
-                    by_row[3 * at[2, corner]] += share * push * v_t
-                    by_row[3 * at[2, corner] + 1] -= share * push * v_s
+
+
+@compile_part
+def _move_cell_corner(
+    by_row: Array, at: IntArray, part: Array, face: Array, shares: FloatArray, code: IntArray, by_s: float, by_t: float
+) -> None:
+    """Add the derivatives of a row by a corner of a cell to those by the corners of both faces."""
+    (i, j), n_part, n_face = (code[0], code[1]), len(part), len(face)
+    if j < 0:
+        _move_corner(by_row, at[0], shares[n_part - 1 - i], by_s, by_t)
+        return
+    if i < 0:
+        by_row[3 * at[2, j]] += by_s
+        by_row[3 * at[2, j] + 1] += by_t
+        return
+    end, after = (i + 1) % n_part, (j + 1) % n_face
+    on_part, on_face, turn = _cross_edges(part, face, i, j)
+    u_s, u_t = part[end, 0] - part[i, 0], part[end, 1] - part[i, 1]
+    v_s, v_t = face[after, 0] - face[j, 0], face[after, 1] - face[j, 1]
+    pull, push = (by_s * v_s + by_t * v_t) / turn, (by_s * u_s + by_t * u_t) / turn
+    for corner, share in ((i, 1 - on_part), (end, on_part)):
+        _move_corner(by_row, at[0], shares[n_part - 1 - corner], -share * pull * u_t, share * pull * u_s)
+    for corner, share in ((j, 1 - on_face), (after, on_face)):
+        by_row[3 * at[2, corner]] += share * push * v_t
+        by_row[3 * at[2, corner] + 1] -= share * push * v_s
 
 
 @compile_part
@@ -431,7 +448,7 @@ def _add_springs(
             for q in range(size):
                 column = 3 * members[start + q]
                 if width > SCANNED:
-                    place = np.uint64(find_entry(indices, np.int64(place), end, column))
+                    place = np.uint64(find_entry(indices, indptr[3 * row], end, column))
                 while indices[place] != column:
                     place += np.uint64(3)
                 by_s, by_t, turn_s, turn_t = by_nodes[r, 3 * q], by_nodes[r, 3 * q + 1], levers[q, 0], levers[q, 1]

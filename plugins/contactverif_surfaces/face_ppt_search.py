@@ -321,10 +321,8 @@ def _find_patches(
         _, centre = place_part(mean, face, table, p % N_PARTS)
         m, where, past = _find_partner(found, (x, master, neighbours), tree, (origin, centre), m)
         set_axes(axes, x, master[m])
-        at_border = neighbours[m, where] < 0 if INSIDE < where < n_master else False
-        if where >= n_master:
-            at_border = free[master[m, where - n_master]]
         n = axes[2, 0], axes[2, 1], axes[2, 2]
+        at_border = _is_free(neighbours[m], free, master[m], where)
         if dot((own[2, 0], own[2, 1], own[2, 2]), n) >= 0 or (at_border and past > tau * heights[m]):
             continue
         home[p] = m
@@ -362,6 +360,14 @@ def _find_patches(
         if count == first + 1 and (on_triangles or not inside):
             count = first
     return home, active, cells[:count], np.ascontiguousarray(corners[:count, :most_corners])
+
+
+@compile_inline
+def _is_free(neighbours: IntArray, free: BoolArray, face: IntArray, where: int) -> bool:
+    """Return whether a place of a face is on the border of the surface."""
+    if where == INSIDE:
+        return False
+    return neighbours[where] < 0 if where < len(face) else free[face[where - len(face)]]
 
 
 @compile_part

@@ -97,7 +97,11 @@ def test_on_strips_the_forces_are_those_of_the_plane(ends: tuple[str, str]) -> N
 
 def distance_to(point: Any, face: Any) -> float:
     """Return the distance of a point from the triangles of a face, by their shares that are ≥ 0 and add up to 1."""
-    corners = [face] if len(face) == 3 else [[*pair, face.mean(axis=0)] for pair in zip(face, np.roll(face, -1, 0))]
+    corners = (
+        [face]
+        if len(face) == 3
+        else [[*pair, face.mean(axis=0)] for pair in zip(face, np.roll(face, -1, 0), strict=True)]
+    )
     found = []
     for triangle in np.array(corners):
         for used in ([0, 1, 2], [0, 1], [1, 2], [2, 0], [0], [1], [2]):

@@ -19,11 +19,11 @@ from zoo.making import SPACE, answers, decides, reports, says, wrap
 TRANSMISSION, RESULTANT = "patch.flat.transmission", "patch.flat.resultant"
 FORCE, MOMENT, TANGENT = "balance.force", "balance.moment", "tangent.directional"
 UNITS, RENUMBERING, LONG, PLACE = "units", "renumbering", "tangent.long", "projection.place"
-STS, CELL, QUARTERS, MORTAR, NTS, NTS_AR = (
-    getattr(contactverif_surfaces, name)
-    for name in ("sts_3d", "vts_cell_3d", "vts_ppt_3d", "mortar_3d", "nts_3d", "nts_ar_3d")
+STS, CELL, PPT, BALANCED, MORTAR, NTS, NTS_AR = (
+    getattr(contactverif_surfaces, f"{name}_3d")
+    for name in ("sts", "vts_cell", "vts_ppt", "vts_ppt_balanced", "mortar", "nts", "nts_ar")
 )
-RIGHT = ("sts-3d", "mortar-3d", "vts-cell-3d", "vts-ppt-3d", "nts-3d", "nts-ar-3d")
+RIGHT = ("sts-3d", "mortar-3d", "vts-cell-3d", "vts-ppt-3d", "vts-ppt-balanced-3d", "nts-3d", "nts-ar-3d")
 LONGEST = 100  # More nodes than a random mesh has.
 
 
@@ -203,7 +203,9 @@ for _row in (
     ("force said to be along the master's normal", "patch.tilted.resultant", says(STS, force_along="master normal")),
     ("cells said to be symmetric", "symmetric", says(STS, symmetric=True)),
     ("cells said to be unbiased", "swap", says(CELL, unbiased=True)),
-    ("quarters said to balance past the border", FORCE, says(QUARTERS, conserves_force=True)),
+    ("quarters said to balance past the border", FORCE, says(PPT, conserves_force=True)),
+    ("printed areas of faces said to push continuously", "continuity", says(PPT, continuity="C0")),
+    ("areas across the normal said to balance", MOMENT, says(BALANCED, conserves_moment=True)),
     ("one point a cell said to be exact on rectangles", TRANSMISSION, by_rule(centre_points)),
     ("nodes said to pass the patch test", TRANSMISSION, says(NTS_AR, flat=True)),
     ("shape functions that pull nodes of a face", "nodal-push", says(changes_points(_dual_shapes), nodes_push=True)),
@@ -387,6 +389,12 @@ def _(right, interface, z):
         if not (near & ~front).any():
             return Pairing({name: array[front] for name, array in pairing.items()})
         front |= near
+
+
+@mutant("Eq. 6 where a part crosses an edge, too", TRANSMISSION, "pair", PPT)
+def _(right, interface, z):
+    pairing = right(interface, z)
+    return Pairing({**pairing, **{name: pairing[name][:0] for name in ("part", "master_face", "corners")}})
 
 
 # Forces and tangents.
