@@ -12,15 +12,15 @@ Otherwise each face j carries W_jk = ∫ N_k over its overlap with the part, in 
 Over a triangle N_k is linear, and the integral exact. On a quadrilateral it has 6 Gauss points on each triangle between
 the middle of the cell and two corners, as `cell_points.gauss_points`.
 
-All sizes of forces are functions of the coordinates y = (s, t, h) of nodes along the axes of m. A turn about n does not
-change them. With the slopes γ_k of the shape functions in the middle of m, δn = −Σ γ_k (n · δx_k), and such a size Q with
-the derivatives Q_y changes by
+All sizes of forces are functions of the coordinates y = (s, t, h) of nodes along the axes of m, and a turn about n does
+not change them. With the slopes γ_k of the shape functions in the middle of m, δn = −Σ γ_k (n · δx_k), and such a size
+Q with the derivatives Q_y changes by
 
     δQ = Σ Q_y · δx + (Σ γ_k (n · δx_k)) · Σ (h Q_st − (s, t) Q_h)          δ(Q n) = n δQ + Q δn
 
 With the weights J = |∂s × ∂t| w of the Gauss points of a part, and with c = (−Σ h_k ∇M_k, 1),
 
-    δN̄_k = Σ δJ (N_k − N̄_k)/A     δV = Σ N̄_k δy_k + Σ y_k δN̄_k     r = δV − Σ M_k δy_k     δM_k = ∇M_k · r     δg = c · r
+    δN̄_k = Σ δJ (N_k − N̄_k)/A      δM_k = ∇M_k · r      δg = c · r      r = Σ N̄_k δy_k + Σ y_k δN̄_k − Σ M_k δy_k
 
 In an integral over a cell the point p with the weight w changes by δ(w N_k) = N_k δw + w ∇N_k · (δp − Σ N_l δy_l). A
 corner where an edge u of the part and an edge v of the face cross moves by what lies there of either edge, δa and δb:

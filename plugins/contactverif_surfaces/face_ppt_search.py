@@ -27,7 +27,7 @@ Rule for the next editor: this file makes decisions. It returns integers, never 
 
 import numpy as np
 
-from contactverif.compiler import compile_inline, compile_maker, compile_part
+from contactverif.compiler import compile_inline, compile_kernel, compile_part
 from contactverif.contract.arrays import UNIT_ROUNDOFF, Array, BoolArray, FloatArray, IntArray
 from contactverif.contract.interface import QUADRILATERAL, TRIANGLE, Interface
 from contactverif.geometry.block_rows import Fields
@@ -75,10 +75,23 @@ def find_patches(interface: Interface, x: FloatArray, tau: float) -> tuple[IntAr
     faces (n_cells, 2), ascending by part, and the codes of their corners (n_cells, most_corners, 2).
     """
     slave, master, neighbours = interface.slave.faces, interface.master.faces, interface.master.neighbours
-    free, at_border = np.zeros(len(x), np.bool_), neighbours < 0
+    free, at_border, table = np.zeros(len(x), np.bool_), neighbours < 0, TABLES[slave.shape[1]]
     free[master[at_border]] = free[np.roll(master, -1, axis=1)[at_border]] = True
-    masters = master, neighbours, free, interface.master.heights(x)
-    return _find_patches(x, slave, masters, tree_of_faces(x, master), TABLES[slave.shape[1]], tau)
+    surfaces = slave, master, neighbours, free, interface.master.heights(x), tree_of_faces(x, master)
+    n, n_slave, n_master, size = len(master), slave.shape[1], master.shape[1], 2 * MOST_CORNERS
+    faces, axes = tuple(map(np.empty, ((n_slave, 3), (n_master, 3), table[0].shape[1:2] + (3,)))), np.empty((3, 3, 3))
+    looks = tuple(map(np.empty, (3, 3, (3, 3), 3)))
+    found = np.empty(n, np.int64), np.empty((2, n)), np.empty(n, np.int64), looks, axes[0], np.empty((2, 3))
+    shapes = tuple(map(np.empty, (n_slave, n_master, (n_master, 2))))
+    clips = np.empty((2, size, 2)), np.empty((2, size, 3), np.int64)
+    count, n_parts = 2 * len(slave) * N_PARTS, len(slave) * N_PARTS
+    while True:
+        home, active, mark = np.full(n_parts, -1), np.zeros(n_parts, np.bool_), np.full(n, -1)
+        cells, corners = np.empty((count, 2), np.int64), np.empty((count + 1, MOST_CORNERS, 2), np.int64)
+        rooms = found, *faces, *shapes, axes[1], axes[2], np.zeros((2, 3)), clips, np.empty(n, np.int64), mark
+        room, count = count, _find_patches((home, active, cells, corners), rooms, x, surfaces, (table, tau))
+        if count <= room:
+            return home, active, cells[:count], corners[:count]
 
 
 @compile_inline
@@ -288,30 +301,17 @@ def _find_partner(found: Fields, surface: Fields, tree: Tree, point: Fields, nea
     return members[chosen], places[chosen], least
 
 
-@compile_maker
-def _find_patches(
-    x: FloatArray, slave: IntArray, masters: Fields, tree: Tree, table: PartTable, tau: float
-) -> tuple[IntArray, BoolArray, IntArray, IntArray]:
-    master, neighbours, free, heights = masters
-    n_parts, n_slave, n_master, n_faces = len(slave) * N_PARTS, slave.shape[1], master.shape[1], len(master)
-    on_triangles = n_slave == TRIANGLE and n_master == TRIANGLE
-    home, active = np.full(n_parts, -1), np.zeros(n_parts, np.bool_)
-    rooms = np.empty(3), np.empty(3), np.empty((3, 3)), np.empty(3)
-    found = (
-        np.empty(n_faces, np.int64),
-        np.empty((2, n_faces)),
-        np.empty(n_faces, np.int64),
+@compile_kernel
+def _find_patches(out: Fields, rooms: Fields, x: FloatArray, surfaces: Fields, rules: Fields) -> int:
+    """Write what `find_patches` returns, cells as far as there is room for them; return their number."""
+    (home, active, cells, corners), (slave, master, neighbours, free, heights, tree) = out, surfaces
+    (table, tau), (found, face, on_master, part, mean, shapes, slopes, own, axes, question, clips, queue, mark) = (
+        rules,
         rooms,
-        np.empty((3, 3)),
-        np.empty((2, 3)),
     )
-    face, on_master, mean = np.empty((n_slave, 3)), np.empty((n_master, 3)), np.empty(n_slave)
-    own, axes, part, question = np.empty((3, 3)), np.empty((3, 3)), np.empty((table[0].shape[1], 3)), np.zeros((2, 3))
-    shapes, slopes, m, count, most_corners = np.empty(n_master), np.empty((n_master, 2)), 0, 0, 1
-    places, codes = np.empty((2, 2 * MOST_CORNERS, 2)), np.empty((2, 2 * MOST_CORNERS, 3), np.int64)
-    queue, mark = np.empty(n_faces, np.int64), np.full(n_faces, -1)
-    cells, corners = np.empty((2 * n_parts, 2), np.int64), np.empty((2 * n_parts, MOST_CORNERS, 2), np.int64)
-    for p in range(n_parts):
+    (places, codes), m, count, n_slave, n_master = clips, 0, 0, slave.shape[1], master.shape[1]
+    on_triangles = n_slave == TRIANGLE and n_master == TRIANGLE
+    for p in range(len(home)):
         nodes, shares = slave[p // N_PARTS], table[0][p % N_PARTS]
         origin = x[nodes[0]]
         set_axes(own, x, nodes)
@@ -336,30 +336,30 @@ def _find_patches(
         if not active[p] or (inside and on_triangles):
             continue
         for axis in range(2):
-            question[0, axis], question[1, axis] = part[:, axis].min(), part[:, axis].max()
+            question[0, axis], question[1, axis] = part[0, axis], part[0, axis]
+            for i in range(1, len(part)):
+                question[0, axis] = min(question[0, axis], part[i, axis])
+                question[1, axis] = max(question[1, axis], part[i, axis])
         first, n_queued, n_seen = count, 1, 0
         queue[0], mark[m] = m, p
         while n_seen < n_queued:
             j, n_corners = queue[n_seen], 0
             n_seen += 1
-            if count == len(cells):
-                cells = np.concatenate((cells, np.empty_like(cells)))
-                corners = np.concatenate((corners, np.empty_like(corners)))
             view_face(on_master, x, master[j], origin, axes, False)
             if may_overlap(question, on_master):
-                n_corners = clip_face(part, on_master, corners[count], places, codes)
+                n_corners = clip_face(part, on_master, corners[min(count, len(cells))], places, codes)
             if n_corners == 0 and j == m:
                 break
             if n_corners > 0:
-                cells[count, 0], cells[count, 1] = p, j
-                count, most_corners = count + 1, max(most_corners, n_corners)
+                cells[min(count, len(cells) - 1), 0], cells[min(count, len(cells) - 1), 1] = p, j
+                count += 1
                 for other in neighbours[j]:
                     if other >= 0 and mark[other] != p:
                         queue[n_queued], mark[other] = other, p
                         n_queued += 1
         if count == first + 1 and (on_triangles or not inside):
             count = first
-    return home, active, cells[:count], np.ascontiguousarray(corners[:count, :most_corners])
+    return count
 
 
 @compile_inline
@@ -367,7 +367,7 @@ def _is_free(neighbours: IntArray, free: BoolArray, face: IntArray, where: int) 
     """Return whether a place of a face is on the border of the surface."""
     if where == INSIDE:
         return False
-    return neighbours[where] < 0 if where < len(face) else free[face[where - len(face)]]
+    return bool(neighbours[where] < 0 if where < len(face) else free[face[where - len(face)]])
 
 
 @compile_part
