@@ -82,9 +82,9 @@ def find_patches(interface: Interface, x: FloatArray, tau: float) -> tuple[IntAr
     faces, axes = tuple(map(np.empty, ((n_slave, 3), (n_master, 3), table[0].shape[1:2] + (3,)))), np.empty((3, 3, 3))
     looks = tuple(map(np.empty, (3, 3, (3, 3), 3)))
     found = np.empty(n, np.int64), np.empty((2, n)), np.empty(n, np.int64), looks, axes[0], np.empty((2, 3))
-    shapes = tuple(map(np.empty, (n_slave, n_master, (n_master, 2))))
+    shapes = np.empty(n_slave), np.empty(n_master), np.empty((n_master, 2))
     clips = np.empty((2, size, 2)), np.empty((2, size, 3), np.int64)
-    count, n_parts = 2 * len(slave) * N_PARTS, len(slave) * N_PARTS
+    count, n_parts = 4 * len(slave) * N_PARTS, len(slave) * N_PARTS
     while True:
         home, active, mark = np.full(n_parts, -1), np.zeros(n_parts, np.bool_), np.full(n, -1)
         cells, corners = np.empty((count, 2), np.int64), np.empty((count + 1, MOST_CORNERS, 2), np.int64)
