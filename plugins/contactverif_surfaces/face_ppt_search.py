@@ -80,15 +80,15 @@ def find_patches(interface: Interface, x: FloatArray, tau: float) -> tuple[IntAr
     surfaces = slave, master, neighbours, free, interface.master.heights(x), tree_of_faces(x, master)
     n, n_slave, n_master, size = len(master), slave.shape[1], master.shape[1], 2 * MOST_CORNERS
     faces, axes = tuple(map(np.empty, ((n_slave, 3), (n_master, 3), table[0].shape[1:2] + (3,)))), np.empty((3, 3, 3))
-    looks = tuple(map(np.empty, (3, 3, (3, 3), 3)))
-    found = np.empty(n, np.int64), np.empty((2, n)), np.empty(n, np.int64), looks, axes[0], np.empty((2, 3))
+    looks = np.empty(3), np.empty(3), np.empty((3, 3)), np.empty(3)
+    candidates = np.empty(n, np.int64), np.empty((2, n)), np.empty(n, np.int64), looks, axes[0], np.empty((2, 3))
     shapes = np.empty(n_slave), np.empty(n_master), np.empty((n_master, 2))
     clips = np.empty((2, size, 2)), np.empty((2, size, 3), np.int64)
     count, n_parts = 4 * len(slave) * N_PARTS, len(slave) * N_PARTS
     while True:
         home, active, mark = np.full(n_parts, -1), np.zeros(n_parts, np.bool_), np.full(n, -1)
         cells, corners = np.empty((count, 2), np.int64), np.empty((count + 1, MOST_CORNERS, 2), np.int64)
-        rooms = found, *faces, *shapes, axes[1], axes[2], np.zeros((2, 3)), clips, np.empty(n, np.int64), mark
+        rooms = candidates, *faces, *shapes, axes[1], axes[2], np.zeros((2, 3)), clips, np.empty(n, np.int64), mark
         room, count = count, _find_patches((home, active, cells, corners), rooms, x, surfaces, (table, tau))
         if count <= room:
             return home, active, cells[:count], corners[:count]
@@ -183,7 +183,7 @@ def _look_at_triangle(nearest: FloatArray, corners: FloatArray) -> tuple[int, fl
 
     It is on an edge, is 3 + a corner, or is INSIDE. Edge i runs from corner i to the next one.
     """
-    where, best, a = INSIDE, np.inf, (corners[0, 0], corners[0, 1], corners[0, 2])
+    site, best, a = INSIDE, np.inf, (corners[0, 0], corners[0, 1], corners[0, 2])
     n = cross(_run(corners, 0, 1), _run(corners, 0, 2))
     height = dot(n, a) / dot(n, n)
     foot = height * n[0], height * n[1], height * n[2]
@@ -198,12 +198,12 @@ def _look_at_triangle(nearest: FloatArray, corners: FloatArray) -> tuple[int, fl
         if share == 1:  # At the node itself, so that the faces there tie exactly.
             place = corners[k, 0], corners[k, 1], corners[k, 2]
         if dot(place, place) < best:
-            where, best = (i if 0 < share < 1 else 3 + (i if share == 0 else k)), dot(place, place)
+            site, best = (i if 0 < share < 1 else 3 + (i if share == 0 else k)), dot(place, place)
             nearest[0], nearest[1], nearest[2] = place
-    if where == INSIDE:
+    if site == INSIDE:
         best = dot(foot, foot)
         nearest[0], nearest[1], nearest[2] = foot
-    return where, best
+    return site, best
 
 
 @compile_inline
@@ -218,7 +218,7 @@ def _look_at_face(rooms: Fields, x: FloatArray, face: IntArray, point: Fields) -
     It is on an edge, is n_corners + a corner, or is INSIDE. The point is an origin (3,) and its place from there.
     """
     (nearest, there, corners, middle), (origin, centre), n_corners = rooms, point, len(face)
-    where, best, farthest = INSIDE, np.inf, 0.0
+    site, best, farthest = INSIDE, np.inf, 0.0
     for axis in range(3 if n_corners == 4 else 0):
         middle[axis] = 0.0
         for i in range(4):
@@ -234,12 +234,12 @@ def _look_at_face(rooms: Fields, x: FloatArray, face: IntArray, point: Fields) -
             arm = corners[k, 0], corners[k, 1], corners[k, 2]
             farthest = max(farthest, dot(arm, arm))
         if square < best:
-            where, best = place, square
+            site, best = place, square
             if n_corners == 4:
-                where = i if place == 0 else (4 + (i + place - 3) % 4 if place == 3 or place == 4 else INSIDE)
+                site = i if place == 0 else (4 + (i + place - 3) % 4 if place == 3 or place == 4 else INSIDE)
             for axis in range(3):
                 nearest[axis] = there[axis]
-    return where, np.sqrt(best), np.sqrt(farthest)
+    return site, np.sqrt(best), np.sqrt(farthest)
 
 
 @compile_inline
@@ -258,12 +258,16 @@ def _is_near(x: FloatArray, face: IntArray, point: Fields, distance: float) -> b
 
 
 @compile_part
-def _find_partner(found: Fields, surface: Fields, tree: Tree, point: Fields, near: int) -> tuple[int, int, float]:
+def _find_partner(candidates: Fields, surface: Fields, tree: Tree, point: Fields, near: int) -> tuple[int, int, float]:
     """Return the face nearest to a point, where on it the nearest place is, and how far the foot is past the face.
 
     A walk from the face `near` to neighbours that are nearer leaves few candidates in a cube around the point.
     """
-    (members, lengths, places, rooms, axes, cube), (x, master, neighbours), (origin, centre) = found, surface, point
+    (members, lengths, places, rooms, axes, cube), (x, master, neighbours), (origin, centre) = (
+        candidates,
+        surface,
+        point,
+    )
     face, best = near, np.inf
     while face >= 0:
         here, face = face, -1
@@ -286,7 +290,7 @@ def _find_partner(found: Fields, surface: Fields, tree: Tree, point: Fields, nea
             places[count], lengths[0, count], lengths[1, count] = _look_at_face(rooms, x, master[members[i]], point)
             best = min(best, lengths[0, count])
             count += 1
-    chosen, least, nearest = -1, np.inf, rooms[0]
+    partner, least, nearest = -1, np.inf, rooms[0]
     for i in range(count):
         if lengths[0, i] > best + TIED / 2 * lengths[1, i]:
             continue
@@ -296,16 +300,19 @@ def _find_partner(found: Fields, surface: Fields, tree: Tree, point: Fields, nea
             set_axes(axes, x, master[members[i]])
             n = cross((nearest[0], nearest[1], nearest[2]), (axes[2, 0], axes[2, 1], axes[2, 2]))
             past = np.sqrt(dot(n, n))
-        if past < least - slack or (past <= least + slack and members[i] < members[chosen]):
-            chosen, least = i, past
-    return members[chosen], places[chosen], least
+        if past < least - slack or (past <= least + slack and members[i] < members[partner]):
+            partner, least = i, past
+    return members[partner], places[partner], least
 
 
 @compile_kernel
 def _find_patches(out: Fields, rooms: Fields, x: FloatArray, surfaces: Fields, rules: Fields) -> int:
     """Write what `find_patches` returns, cells as far as there is room for them; return their number."""
     (home, active, cells, corners), (slave, master, neighbours, free, heights, tree) = out, surfaces
-    (table, tau), (found, face, on_master, part, mean, shapes, slopes, own, axes, question, clips, queue, mark) = (
+    (
+        (table, tau),
+        (candidates, face, on_master, part, mean, shapes, slopes, slave_axes, axes, question, clips, queue, mark),
+    ) = (
         rules,
         rooms,
     )
@@ -314,16 +321,18 @@ def _find_patches(out: Fields, rooms: Fields, x: FloatArray, surfaces: Fields, r
     for p in range(len(home)):
         nodes, shares = slave[p // N_PARTS], table[0][p % N_PARTS]
         origin = x[nodes[0]]
-        set_axes(own, x, nodes)
+        set_axes(slave_axes, x, nodes)
         for i in range(n_slave):
             for axis in range(3):
                 face[i, axis] = x[nodes[i], axis] - origin[axis]
         _, centre = place_part(mean, face, table, p % N_PARTS)
-        m, where, past = _find_partner(found, (x, master, neighbours), tree, (origin, centre), m)
+        m, site, past = _find_partner(candidates, (x, master, neighbours), tree, (origin, centre), m)
         set_axes(axes, x, master[m])
         n = axes[2, 0], axes[2, 1], axes[2, 2]
-        at_border = _is_free(neighbours[m], free, master[m], where)
-        if dot((own[2, 0], own[2, 1], own[2, 2]), n) >= 0 or (at_border and past > tau * heights[m]):
+        at_border = _is_free(neighbours[m], free, master[m], site)
+        if dot((slave_axes[2, 0], slave_axes[2, 1], slave_axes[2, 2]), n) >= 0 or (
+            at_border and past > tau * heights[m]
+        ):
             continue
         home[p] = m
         view_face(face, x, nodes, origin, axes, False)
@@ -363,11 +372,11 @@ def _find_patches(out: Fields, rooms: Fields, x: FloatArray, surfaces: Fields, r
 
 
 @compile_inline
-def _is_free(neighbours: IntArray, free: BoolArray, face: IntArray, where: int) -> bool:
+def _is_free(neighbours: IntArray, free: BoolArray, face: IntArray, site: int) -> bool:
     """Return whether a place of a face is on the border of the surface."""
-    if where == INSIDE:
+    if site == INSIDE:
         return False
-    return bool(neighbours[where] < 0 if where < len(face) else free[face[where - len(face)]])
+    return bool(neighbours[site] < 0 if site < len(face) else free[face[site - len(face)]])
 
 
 @compile_part

@@ -127,7 +127,7 @@ def test_the_version_is_told(start: tuple[str, ...]) -> None:
     ("words", "expected"),
     [
         ("contactverif ver", {"verify"}),
-        ("contactverif verify vts-pp", {"vts-ppt", "vts-ppt-3d", "vts-ppt-basic", "vts-ppt-balanced", "vts-ppt-lm"}),
+        ("contactverif verify vts-ppt-b", {"vts-ppt-basic", "vts-ppt-balanced", "vts-ppt-balanced-3d"}),
         ("contactverif compare nts --against chen", {"chen-hisada"}),
         ("contactverif verify nts -p balance", {"balance.force", "balance.moment"}),
     ],

@@ -34,7 +34,7 @@ def pushes(name: str, case: Case) -> Any:
 
 @pytest.mark.parametrize("case", ["tilted-faces", "tilted-halves"])
 def test_the_forces_on_a_tilted_square_are_exact(case: str) -> None:
-    """Of eight parts four lie in one triangle, where Eq. 6 holds; the others press with projected areas."""
+    """Eq. 6 holds for the four parts that lie in one triangle; the other four press with projected areas."""
     state, cosine = named_case(case), 1 / np.sqrt(1.078125)
     n_slave = state.interface.n_slave_nodes
     printed, balanced = pushes(PRINTED, state), pushes(BALANCED, state)
@@ -102,15 +102,15 @@ def distance_to(point: Any, face: Any) -> float:
         if len(face) == 3
         else [[*pair, face.mean(axis=0)] for pair in zip(face, np.roll(face, -1, 0), strict=True)]
     )
-    found = []
+    distances = []
     for triangle in np.array(corners):
         for used in ([0, 1, 2], [0, 1], [1, 2], [2, 0], [0], [1], [2]):
             first, *others = triangle[used]
             edges = np.array(others).reshape(-1, 3) - first
             shares = np.linalg.lstsq(edges.T, point - first, rcond=None)[0] if others else np.zeros(0)
             if (shares >= 0).all() and shares.sum() <= 1:
-                found.append(np.linalg.norm(first + shares @ edges - point))
-    return float(min(found))
+                distances.append(np.linalg.norm(first + shares @ edges - point))
+    return float(min(distances))
 
 
 @pytest.mark.parametrize("faces", BOTH)
