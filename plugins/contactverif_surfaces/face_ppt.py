@@ -83,15 +83,8 @@ def _make_rooms(interface: Interface, dtype: Any, size: int, width: int) -> tupl
     out = size, (size, width), (size, 3), (size, 2)
     part = (3, 3), (n_slave, 3), (n_master, 3), (n_slave, 3), n_slave, n_master, (n_master, 2)
     slopes = width, (3, width), (n_slave, width), width, width
-    cell = (
-        (n_master, 3),
-        (MOST_CORNERS, 2),
-        (n_master, MOST_CORNERS, 2),
-        (n_master, 2),
-        n_master,
-        n_master,
-        (n_master, 2),
-    )
+    corner = n_master, MOST_CORNERS, 2
+    cell = (n_master, 3), corner[1:], corner, (n_master, 2), n_master, n_master, (n_master, 2)
     first, second, third = (tuple(np.empty(shape, dtype) for shape in each) for each in (out, part + slopes, cell))
     return first, (*second, np.empty((3, 4), np.int64)), third
 
@@ -200,7 +193,7 @@ def _press_part(rooms: Fields, x: Array, faces: Fields, pairing: Fields, rules: 
     for c in range(first, last):
         view_face(on_face, x, master[cells[c]], x[face[0]], axes, False)
         _see_face(at[2], places, of_members, master[cells[c]], on_face)
-        _add_cell(pushes, by_nodes, of_part, of_cell, rule, table[0][p % N_PARTS], codes[c], width)
+        _add_cell(rooms, rule, table[0][p % N_PARTS], codes[c], width)
     factor, whole = -penalty * gap, 0.0 * gap
     for q in range(width):
         by_factor[q] = -penalty * by_gap[q]
@@ -266,16 +259,10 @@ def _differentiate_part(of_part: Fields, centre: Fields, area: float, table: Fie
 def _cross_edges(part: Array, face: Array, i: int, j: int) -> tuple[float, float, float]:
     """Return where edge i of a part and edge j of a face cross, as shares of both, and u × v."""
     k, end = (j + 1) % len(face), (i + 1) % len(part)
-    u_s, u_t, arm_s, arm_t = (
-        part[end, 0] - part[i, 0],
-        part[end, 1] - part[i, 1],
-        face[j, 0] - part[i, 0],
-        face[j, 1] - part[i, 1],
-    )
-    here, there = (
-        _cross_plane(u_s, u_t, arm_s, arm_t),
-        _cross_plane(u_s, u_t, face[k, 0] - part[i, 0], face[k, 1] - part[i, 1]),
-    )
+    u_s, u_t = part[end, 0] - part[i, 0], part[end, 1] - part[i, 1]
+    arm_s, arm_t = face[j, 0] - part[i, 0], face[j, 1] - part[i, 1]
+    here = _cross_plane(u_s, u_t, arm_s, arm_t)
+    there = _cross_plane(u_s, u_t, face[k, 0] - part[i, 0], face[k, 1] - part[i, 1])
     on_part = _cross_plane(arm_s, arm_t, face[k, 0] - face[j, 0], face[k, 1] - face[j, 1]) / (there - here)
     return on_part, here / (here - there), there - here
 
@@ -315,18 +302,10 @@ def _place_middle(cell: Array, n: int, linear: bool) -> tuple[float, float, floa
 
 
 @compile_part
-def _add_cell(
-    pushes: Array,
-    by_nodes: Array,
-    of_part: Fields,
-    of_cell: Fields,
-    rule: Fields,
-    shares: FloatArray,
-    codes: IntArray,
-    width: int,
-) -> None:
+def _add_cell(rooms: Fields, rule: Fields, shares: FloatArray, codes: IntArray, width: int) -> None:
     """Add the integrals of shape functions over a cell, and their derivatives, to the rows of the face's nodes."""
-    (face, cell, by_corner, by_middle, means, shapes, slopes), (places, weights) = of_cell, rule
+    ((pushes, by_nodes, _, _), of_part, of_cell), (places, weights) = rooms, rule
+    face, cell, by_corner, by_middle, means, shapes, slopes = of_cell
     part, at = of_part[3], of_part[12]
     n, n_face = _place_cell(cell, part, face, codes), len(face)
     m_s, m_t, total = _place_middle(cell, n, n_face == 3)

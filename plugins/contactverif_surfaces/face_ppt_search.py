@@ -263,11 +263,8 @@ def _find_partner(candidates: Fields, surface: Fields, tree: Tree, point: Fields
 
     A walk from the face `near` to neighbours that are nearer leaves few candidates in a cube around the point.
     """
-    (members, lengths, places, rooms, axes, cube), (x, master, neighbours), (origin, centre) = (
-        candidates,
-        surface,
-        point,
-    )
+    members, lengths, places, rooms, axes, cube = candidates
+    (x, master, neighbours), (origin, centre) = surface, point
     face, best = near, np.inf
     while face >= 0:
         here, face = face, -1
@@ -309,13 +306,8 @@ def _find_partner(candidates: Fields, surface: Fields, tree: Tree, point: Fields
 def _find_patches(out: Fields, rooms: Fields, x: FloatArray, surfaces: Fields, rules: Fields) -> int:
     """Write what `find_patches` returns, cells as far as there is room for them; return their number."""
     (home, active, cells, corners), (slave, master, neighbours, free, heights, tree) = out, surfaces
-    (
-        (table, tau),
-        (candidates, face, on_master, part, mean, shapes, slopes, slave_axes, axes, question, clips, queue, mark),
-    ) = (
-        rules,
-        rooms,
-    )
+    candidates, face, on_master, part, mean, shapes, slopes, slave_axes, axes, question, clips, queue, mark = rooms
+    (table, tau), normal = rules, slave_axes[2]
     (places, codes), m, count, n_slave, n_master = clips, 0, 0, slave.shape[1], master.shape[1]
     on_triangles = n_slave == TRIANGLE and n_master == TRIANGLE
     for p in range(len(home)):
@@ -330,9 +322,7 @@ def _find_patches(out: Fields, rooms: Fields, x: FloatArray, surfaces: Fields, r
         set_axes(axes, x, master[m])
         n = axes[2, 0], axes[2, 1], axes[2, 2]
         at_border = _is_free(neighbours[m], free, master[m], site)
-        if dot((slave_axes[2, 0], slave_axes[2, 1], slave_axes[2, 2]), n) >= 0 or (
-            at_border and past > tau * heights[m]
-        ):
+        if dot((normal[0], normal[1], normal[2]), n) >= 0 or (at_border and past > tau * heights[m]):
             continue
         home[p] = m
         view_face(face, x, nodes, origin, axes, False)
