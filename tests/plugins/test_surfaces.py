@@ -18,7 +18,7 @@ from contactverif_surfaces.cell_points import GAUSS, evaluate_shapes
 
 NAMES = contactverif_surfaces.__all__
 PASSING = [name for name in NAMES if not name.startswith("nts")]
-ON_QUADRILATERALS = ["sts_3d", "mortar_3d"]
+ON_QUADRILATERALS = ["sts_3d", "mortar_3d", "vts_ppt_3d", "vts_ppt_balanced_3d"]
 
 
 def factory(name: str) -> Any:

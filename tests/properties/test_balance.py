@@ -10,9 +10,11 @@ from subjects import judge_as, load_property, load_subject, with_promises
 from textbook_cells import ClippedCells, WeightedGaps
 from zoo.at_points import SlaveNormalAtGaussPoints
 
+import contactverif_surfaces
 from contactverif import Case, Promises, Subject, Traits, Verdict, named_case
 from contactverif.contract.arrays import FloatArray
 from contactverif.sampling.draw import draw_cases
+from contactverif.strategies.surfaces import sliding_surface_cases
 from contactverif.strategies.translations import _opens_at_once, sliding_cases
 from contactverif_properties.balance import N_STEPS, continuity, find_jumps
 
@@ -59,6 +61,20 @@ def test_far_from_the_origin_positions_are_rounded_whoever_measures_gaps() -> No
 def test_a_stranger_that_pushes_along_the_slave_is_continuous(make: Callable[..., Any]) -> None:
     for case in cases(4):
         judge_as(Verdict.PASS, continuity, case, with_promises(make, continuity="C0"))
+
+
+@pytest.mark.parametrize("name", ["sts_3d", "mortar_3d", "vts_cell_3d", "nts_ar_3d"])
+def test_a_force_that_crosses_edges_of_a_flat_master_is_continuous(name: str) -> None:
+    smooth = with_promises(getattr(contactverif_surfaces, name), continuity="C0")
+    for case in draw_cases(sliding_surface_cases(), seed="sliding", examples=6).cases:
+        judge_as(Verdict.PASS, continuity, case, smooth)
+
+
+def test_a_part_that_crosses_an_edge_changes_to_projected_areas() -> None:
+    """The first edge of the slave enters the second face at 1/4 of its way, and its last one at 3/4."""
+    measurement = continuity.measure(named_case("sliding-faces"), load_subject("vts-ppt-3d"))
+    assert measurement.values["jump of a force"] == pytest.approx(0.034, abs=1e-3)
+    assert measurement.details["place of the largest jump"] == pytest.approx(0.75, abs=1e-6)
 
 
 def test_the_size_and_the_place_of_a_jump_are_found() -> None:
