@@ -39,6 +39,7 @@ from contactverif_surfaces.face_search import (
     clip_face,
     collect_boxes,
     may_overlap,
+    measure_distance,
     set_axes,
     tree_of_faces,
     view_face,
@@ -331,7 +332,7 @@ def _find_patches(out: Fields, rooms: Fields, x: FloatArray, surfaces: Fields, r
         set_shapes(shapes, slopes, on_master, centre[0], centre[1])
         active[p] = centre[2] - combine(on_master, shapes)[2] < 0
         set_corners(part, face, shares)
-        inside = _holds_part(on_master, part)
+        inside = _holds_part(on_master, part, measure_distance(origin))
         if not active[p] or (inside and on_triangles):
             continue
         for axis in range(2):
@@ -346,7 +347,9 @@ def _find_patches(out: Fields, rooms: Fields, x: FloatArray, surfaces: Fields, r
             n_seen += 1
             view_face(on_master, x, master[j], origin, axes, False)
             if may_overlap(question, on_master):
-                n_corners = clip_face(part, on_master, corners[min(count, len(cells))], places, codes)
+                n_corners = clip_face(
+                    part, on_master, corners[min(count, len(cells))], places, codes, measure_distance(origin)
+                )
             if n_corners == 0 and j == m:
                 break
             if n_corners > 0:
@@ -370,9 +373,8 @@ def _is_free(neighbours: IntArray, free: BoolArray, face: IntArray, site: int) -
 
 
 @compile_part
-def _holds_part(face: FloatArray, part: FloatArray) -> bool:
-    """Return whether all of a part lies on a face, or past an edge of it by roundoff."""
-    size = 0.0
+def _holds_part(face: FloatArray, part: FloatArray, size: float) -> bool:
+    """Return whether all of a part lies on a face, or past an edge of it by roundoff of this size at least."""
     for corners in (face, part):
         for i in range(len(corners)):
             size = max(size, abs(corners[i, 0]), abs(corners[i, 1]))

@@ -12,9 +12,10 @@ A slave face and a master face make a cell where, seen along the slave's normal,
 A corner of a cell is two integers (i, j): slave corner i is (i, −1), master corner j is (−1, j), and (i, j) is the
 crossing of slave edge i and master edge j. The master is numbered in reverse, so that both run counter-clockwise.
 
-Two edges cross only if both ends lie off the other edge by more than `TIE` × size × length of that edge. Otherwise the
-place of a crossing would be a quotient of two roundoffs: meshes that share an edge have many such pairs. For the same
-reason there is no cell that is thinner than `TIE` × size: its centroid could be anywhere.
+Two edges cross only if both ends lie off the other edge by more than `TIE` × size × length of that edge, where the size
+is no less than the distance from the origin, at which positions are rounded. Otherwise the place of a crossing would be
+a quotient of two roundoffs: meshes that share an edge have many such pairs. For the same reason there is no cell that
+is thinner than `TIE` × size: its centroid could be anywhere.
 
 Candidates come from a tree of boxes, at a cost of O(log n) for each slave face. Boxes are sorted along a curve that
 fills space (Morton's), so that neighbours in the list are neighbours in space. Of this list `LEAF` boxes at a time are
@@ -134,7 +135,7 @@ def find_face_cells(
         for place in range(n_facing):
             m = members[place]
             view_face(on_master, x, master[m], origin, axes, True)
-            n_corners = clip_face(on_slave, on_master, corners[count], places, codes)
+            n_corners = clip_face(on_slave, on_master, corners[count], places, codes, measure_distance(origin))
             if n_corners > 0:
                 row = table[count - first]
                 _set_plane(row, places[len(on_slave) % 2], n_corners, on_master)
@@ -222,6 +223,12 @@ def view_face(
 
 
 @compile_part
+def measure_distance(point: FloatArray) -> float:
+    """Return the largest coordinate of a point (3,)."""
+    return max(abs(point[0]), abs(point[1]), abs(point[2]))
+
+
+@compile_part
 def may_overlap(question: FloatArray, master: FloatArray) -> bool:
     """Return whether the box of a master face, seen in the plane, meets that of the slave, and faces it."""
     for axis in range(2):
@@ -238,14 +245,18 @@ def may_overlap(question: FloatArray, master: FloatArray) -> bool:
 
 
 @compile_part
-def clip_face(slave: FloatArray, master: FloatArray, corners: IntArray, places: FloatArray, codes: IntArray) -> int:
+def clip_face(
+    slave: FloatArray, master: FloatArray, corners: IntArray, places: FloatArray, codes: IntArray, distance: float
+) -> int:
     """Clip the master face by the slave face; write the corners of what is left, and return their number, 0 for none.
+
+    Stored positions are rounded at their `distance` from the origin, which ties must allow for.
 
     Of both halves of `places` and `codes` one is written from the other, once for each slave edge: the result is in
     half `len(slave) % 2`. A code is (i, j) and a label, which tells which edge leaves a corner: master edge j is j,
     slave edge i is −1 − i.
     """
-    size, count, old = 0.0, len(master), 0
+    size, count, old = distance, len(master), 0
     for i in range(len(slave)):
         size = max(size, abs(slave[i, 0]), abs(slave[i, 1]))
     for j in range(count):
