@@ -13,9 +13,9 @@ slave face has the gap to the master face opposite, along the slave's normal. It
 shape functions at the node. The same pressure acts on every master face under the part, integrated with the master's
 shape functions. On triangles both sides balance where the master covers the part; on warped quadrilaterals they do not.
 
-Nodes: a spring at each slave node acts along the normal of the master face that it stands on. The foot of a node is the
-point of a master face straight below it; of the faces that have one, the nearest counts, if its gap is at most
-2 (h_s + h_m) either way, as for cells (`face_search`). The force is split by the shape functions of the foot. Neither
+Nodes: a spring at each slave node acts along the normal of the nearest master face (`face_ppt_search`), if the gap is
+at most 2 (h_s + h_m) either way, as for cells (`face_search`). The foot is straight below the node, past the edge of
+its face if the node stands over one. The force is split by the shape functions of the foot. Neither
 the same stiffness at each node nor that of the area around it transmits a uniform pressure between meshes that do not
 match.
 """
@@ -50,7 +50,8 @@ from contactverif_surfaces.cell_points import (
     report_points,
     unknowns_of,
 )
-from contactverif_surfaces.face_search import REACH, find_boxes_at, find_cells, grow_tree, longest_edges
+from contactverif_surfaces.face_ppt_search import N_PARTS, PARTS, find_nearest_faces
+from contactverif_surfaces.face_search import REACH, find_cells, longest_edges
 
 PointRule = Callable[[SlaveView, IntArray], CellPoints]  # It takes the view and the codes of cells.
 N_POINTS = 6  # Gauss points a triangle of the mortar method: a gap × two shape functions has degree 3.
@@ -216,25 +217,6 @@ def mortar_3d(*, penalty: float) -> SurfaceMortar:
     return SurfaceMortar(SURFACE_TRAITS.revise(faces=(3, 4), source=source, **shapes), check_penalty(penalty))
 
 
-N_PARTS = 4
-
-
-def _quarter(n_corners: int) -> FloatArray:
-    """Return the corners of the parts as shares of the corners of a face, (N_PARTS, corners of a part, n_corners).
-
-    Each corner of the face has a part, between the middles of its edges. A triangle has a fourth part in its middle.
-    """
-    whole = np.eye(n_corners)
-    after, before = (whole + np.roll(whole, step, axis=0) for step in (-1, 1))
-    if n_corners == TRIANGLE:
-        corners = np.stack([whole, after / 2, before / 2], axis=1)
-        return np.concatenate([corners, corners[None, :, 1]])
-    return np.stack([whole, after / 2, np.full_like(whole, 1 / n_corners), before / 2], axis=1)
-
-
-PARTS = {n_corners: _quarter(n_corners) for n_corners in (3, 4)}
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class FaceQuarters:
     """The formulation: pressure −ε̂ g of each part of a slave face, where the gap g at its centre is below 0."""
@@ -382,20 +364,11 @@ class NodesOnFaces:
         x, faces = np.array(z).reshape(-1, 3), interface.slave.faces
         edge, reach = np.zeros(interface.n_slave_nodes), REACH * longest_edges(interface.master, x)
         edge[faces] = longest_edges(interface.slave, x)[:, None]
-        reach += REACH * edge.max()
-        corners = x[interface.master.faces]
-        # The boxes that hold all that a face reaches along its normal, and a little more for feet past the border.
-        more = reach[:, None] * (np.abs(axes_of(corners)[2]) + 2 * PAST_BORDER)
-        prisms = np.stack([corners.min(axis=1) - more, corners.max(axis=1) + more], axis=1)
-        node, face = find_boxes_at(x[: len(edge)], grow_tree(prisms))
-        points = _feet(positions_of(x.reshape(-1), _nodes_and_faces(interface, node, face)))
-        gap = points.gap[:, 0]
-        near = np.abs(gap) <= reach[face] - REACH * (edge.max() - edge[node])
-        good = np.flatnonzero(near & (points.slave_shape[:, 0].min(axis=1) >= -PAST_BORDER))
-        order = good[np.lexsort((face[good], np.abs(gap[good]), node[good]))]
-        first = order[np.diff(node[order], prepend=-1) > 0]  # The nearest of each node.
-        home, active = np.full(len(edge), -1), np.zeros(len(edge), bool)
-        home[node[first]], active[node[first]] = face[first], gap[first] < 0
+        home = find_nearest_faces(x, len(edge), interface.master, PAST_BORDER)
+        nodes = np.flatnonzero(home >= 0)
+        gap = _feet(positions_of(x.reshape(-1), _nodes_and_faces(interface, nodes, home[nodes]))).gap[:, 0]
+        is_near, active = np.abs(gap) <= reach[home[nodes]] + REACH * edge[nodes], np.zeros(len(edge), bool)
+        home[nodes[~is_near]], active[nodes] = -1, is_near & (gap < 0)
         return Pairing({"home": home, "active": active})
 
     def residual(self, interface: Interface, pairing: Pairing, z: Array, /) -> Array:

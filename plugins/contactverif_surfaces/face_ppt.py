@@ -52,8 +52,9 @@ from contactverif.geometry.block_rows import (
     zero_matrix,
 )
 from contactverif_surfaces.cell_points import GAUSS, SURFACE_TRAITS
-from contactverif_surfaces.face_methods import N_PARTS, FaceQuarters, press_along_slave
+from contactverif_surfaces.face_methods import FaceQuarters, press_along_slave
 from contactverif_surfaces.face_ppt_search import (
+    N_PARTS,
     TABLES,
     combine,
     cross,

@@ -29,9 +29,8 @@ import numpy as np
 
 from contactverif.compiler import compile_inline, compile_kernel, compile_part
 from contactverif.contract.arrays import UNIT_ROUNDOFF, Array, BoolArray, FloatArray, IntArray
-from contactverif.contract.interface import QUADRILATERAL, TRIANGLE, Interface
+from contactverif.contract.interface import QUADRILATERAL, TRIANGLE, Interface, Surface
 from contactverif.geometry.block_rows import Fields
-from contactverif_surfaces.face_methods import N_PARTS, PARTS
 from contactverif_surfaces.face_search import (
     MOST_CORNERS,
     TIE,
@@ -45,6 +44,23 @@ from contactverif_surfaces.face_search import (
     view_face,
 )
 
+N_PARTS = 4
+
+
+def _quarter(n_corners: int) -> FloatArray:
+    """Return the corners of the parts as shares of the corners of a face, (N_PARTS, corners of a part, n_corners).
+
+    Each corner of the face has a part, between the middles of its edges. A triangle has a fourth part in its middle.
+    """
+    whole = np.eye(n_corners)
+    after, before = (whole + np.roll(whole, step, axis=0) for step in (-1, 1))
+    if n_corners == TRIANGLE:
+        corners = np.stack([whole, after / 2, before / 2], axis=1)
+        return np.concatenate([corners, corners[None, :, 1]])
+    return np.stack([whole, after / 2, np.full_like(whole, 1 / n_corners), before / 2], axis=1)
+
+
+PARTS = {n_corners: _quarter(n_corners) for n_corners in (3, 4)}
 TIED = 64 * UNIT_ROUNDOFF
 INSIDE = -1  # The nearest place of a face is on no edge of it.
 Arm = tuple[float, float, float]  # A vector in space.
@@ -76,20 +92,18 @@ def find_patches(interface: Interface, x: FloatArray, tau: float) -> tuple[IntAr
     faces (n_cells, 2), ascending by part, and the codes of their corners (n_cells, most_corners, 2).
     """
     slave, master, neighbours = interface.slave.faces, interface.master.faces, interface.master.neighbours
-    free, at_border, table = np.zeros(len(x), np.bool_), neighbours < 0, TABLES[slave.shape[1]]
-    free[master[at_border]] = free[np.roll(master, -1, axis=1)[at_border]] = True
+    free, table = _mark_border(interface.master, len(x)), TABLES[slave.shape[1]]
     surfaces = slave, master, neighbours, free, interface.master.heights(x), tree_of_faces(x, master)
     n, n_slave, n_master, size = len(master), slave.shape[1], master.shape[1], 2 * MOST_CORNERS
-    faces, axes = tuple(map(np.empty, ((n_slave, 3), (n_master, 3), table[0].shape[1:2] + (3,)))), np.empty((3, 3, 3))
-    looks = np.empty(3), np.empty(3), np.empty((3, 3)), np.empty(3)
-    candidates = np.empty(n, np.int64), np.empty((2, n)), np.empty(n, np.int64), looks, axes[0], np.empty((2, 3))
+    faces, axes = tuple(map(np.empty, ((n_slave, 3), (n_master, 3), table[0].shape[1:2] + (3,)))), np.empty((2, 3, 3))
+    candidates = _make_candidates(n)
     shapes = np.empty(n_slave), np.empty(n_master), np.empty((n_master, 2))
     clips = np.empty((2, size, 2)), np.empty((2, size, 3), np.int64)
     count, n_parts = 4 * len(slave) * N_PARTS, len(slave) * N_PARTS
     while True:
         home, active, mark = np.full(n_parts, -1), np.zeros(n_parts, np.bool_), np.full(n, -1)
         cells, corners = np.empty((count, 2), np.int64), np.empty((count + 1, MOST_CORNERS, 2), np.int64)
-        rooms = candidates, *faces, *shapes, axes[1], axes[2], np.zeros((2, 3)), clips, np.empty(n, np.int64), mark
+        rooms = candidates, *faces, *shapes, axes[0], axes[1], np.zeros((2, 3)), clips, np.empty(n, np.int64), mark
         room, count = count, _find_patches((home, active, cells, corners), rooms, x, surfaces, (table, tau))
         if count <= room:
             return home, active, cells[:count], corners[:count]
@@ -362,6 +376,40 @@ def _find_patches(out: Fields, rooms: Fields, x: FloatArray, surfaces: Fields, r
         if count == first + 1 and (on_triangles or not inside):
             count = first
     return count
+
+
+def find_nearest_faces(x: FloatArray, n_points: int, surface: Surface, tau: float) -> IntArray:
+    """Return the nearest face (n_points,) of a surface to each of the first nodes.
+
+    It is −1 where the nearest place is on the border, and the node past that by more than τ × the height of the face.
+    """
+    faces, neighbours = surface.faces, surface.neighbours
+    surfaces = faces, neighbours, _mark_border(surface, len(x)), surface.heights(x), tree_of_faces(x, faces)
+    nearest = np.empty(n_points, np.int64)
+    _find_nearest(nearest, _make_candidates(len(faces)), x, surfaces, tau)
+    return nearest
+
+
+@compile_kernel
+def _find_nearest(nearest: IntArray, candidates: Fields, x: FloatArray, surfaces: Fields, tau: float) -> None:
+    (faces, neighbours, free, heights, tree), centre, m = surfaces, (0.0, 0.0, 0.0), 0
+    for node in range(len(nearest)):
+        m, site, past = _find_partner(candidates, (x, faces, neighbours), tree, (x[node], centre), m)
+        is_past = _is_free(neighbours[m], free, faces[m], site) and past > tau * heights[m]
+        nearest[node] = -1 if is_past else m
+
+
+def _mark_border(surface: Surface, n_nodes: int) -> BoolArray:
+    """Return which nodes (n_nodes,) are on the border of a surface."""
+    free, at_border = np.zeros(n_nodes, np.bool_), surface.neighbours < 0
+    free[surface.faces[at_border]] = free[np.roll(surface.faces, -1, axis=1)[at_border]] = True
+    return free
+
+
+def _make_candidates(n: int) -> Fields:
+    """Return what the search of a partner among n faces writes."""
+    looks = np.empty(3), np.empty(3), np.empty((3, 3)), np.empty(3)
+    return np.empty(n, np.int64), np.empty((2, n)), np.empty(n, np.int64), looks, np.empty((3, 3)), np.empty((2, 3))
 
 
 @compile_inline

@@ -438,18 +438,3 @@ def _meets(box: FloatArray, origin: FloatArray, axes: FloatArray, question: Floa
         if nearest > question[1, row] + margin or farthest < question[0, row] - margin:
             return False
     return True
-
-
-@compile_maker
-def find_boxes_at(points: FloatArray, tree: Tree) -> tuple[IntArray, IntArray]:
-    """Return pairs of points (n, 3) and boxes by their numbers, all where the point lies in the box and some more."""
-    axes, question, members = np.eye(3), np.zeros((2, 3)), np.empty(len(tree[0]), np.int64)
-    counts = np.empty(len(points), np.int64)
-    for i in range(len(points)):
-        counts[i] = collect_boxes(members, tree, points[i], axes, question)
-    point, box, count = np.empty(counts.sum(), np.int64), np.empty(counts.sum(), np.int64), 0
-    for i in range(len(points)):
-        for place in range(collect_boxes(members, tree, points[i], axes, question)):
-            point[count], box[count] = i, members[place]
-            count += 1
-    return point, box
