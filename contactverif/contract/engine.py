@@ -42,6 +42,8 @@ class EngineTraits:
         On finer meshes the answers converge to the exact ones; None promises nothing.
     source : str
         The documentation or publication of the code.
+    dimensions : tuple[int, ...]
+        The numbers of coordinates that it takes: (2,), (3,) or (2, 3). An engine that takes both is asked in the plane.
     """
 
     enforcement: EngineEnforcement
@@ -51,6 +53,7 @@ class EngineTraits:
     passes_flat_patch: bool | None = None
     converges: bool | None = None
     source: str = ""
+    dimensions: tuple[int, ...] = (2,)
 
     def __post_init__(self) -> None:
         if self.enforcement not in get_args(EngineEnforcement):
@@ -58,33 +61,40 @@ class EngineTraits:
         for name in ("accuracy", "load_scale"):
             if not 0 < getattr(self, name) <= 1:
                 raise ValueError(f"{name}: found {getattr(self, name)!r}; needed a number above 0, at most 1")
+        if self.dimensions not in ((2,), (3,), (2, 3)):
+            raise ValueError(f"dimensions: found {self.dimensions!r}; needed (2,), (3,) or (2, 3)")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SceneArrays:
-    """A scene as plain arrays, which any code can read: plane strain, linear elastic or rigid bodies, no friction.
+    """A scene as plain arrays, which any code can read: linear elastic or rigid bodies, no friction.
+
+    In the plane (dim = 2) the strain is plane. In space (dim = 3) cells are solids, and contact edges are faces.
 
     Attributes
     ----------
-    nodes : FloatArray, shape (n_nodes, 2)
+    nodes : FloatArray, shape (n_nodes, dim)
         The reference positions of all bodies, a length each.
-    cells : IntArray, shape (n_cells, 4)
-        The node numbers of each triangle or quadrilateral, counter-clockwise; −1 is the fourth of a triangle. The nodes
-        of a rigid body have no cells.
+    cells : IntArray, shape (n_cells, 4 or 8)
+        The node numbers of each triangle or quadrilateral, counter-clockwise; −1 is the fourth of a triangle. In space
+        those of each tetrahedron or hexahedron as `contactverif.Body` orders them; −1 stands behind a tetrahedron's
+        four. The nodes of a rigid body have no cells.
     body_of_cell, body_of_node : IntArray, shape (n_cells,) and (n_nodes,)
         The body that each cell and each node belongs to, 0 to n_bodies − 1.
-    slave, master : IntArray, shape (n_segments, 2)
-        The contact edges of both sides, each with its body on the left.
-    fixed : BoolArray, shape (n_nodes, 2)
+    slave, master : IntArray, shape (n_segments, 2 or 4)
+        The contact edges of both sides, each with its body on the left. In space the faces, counter-clockwise seen from
+        outside of the body; −1 is the fourth of a triangle.
+    fixed : BoolArray, shape (n_nodes, dim)
         True for each imposed component of a displacement, in the axes of the body.
-    imposed : FloatArray, shape (n_nodes, 2)
+    imposed : FloatArray, shape (n_nodes, dim)
         The imposed displacements, a length each, in the axes of the body; 0 where nothing is fixed.
-    load : FloatArray, shape (n_nodes, 2)
-        The nodal forces per unit of thickness, in the axes of the body.
-    start : FloatArray, shape (n_nodes, 2)
+    load : FloatArray, shape (n_nodes, dim)
+        The nodal forces, in the plane per unit of thickness, in the axes of the body.
+    start : FloatArray, shape (n_nodes, dim)
         A first guess of the displacements, in global axes.
-    axes : FloatArray, shape (n_bodies, 2)
-        The first axis of each body, a unit vector. The second is a quarter turn counter-clockwise from it.
+    axes : FloatArray, shape (n_bodies, 2) or (n_bodies, 2, 3)
+        The first axis of each body, a unit vector. The second is a quarter turn counter-clockwise from it. In space the
+        first two axes, to which the third is normal.
     young, poisson : FloatArray, shape (n_bodies,)
         Young's modulus, force per length squared, and Poisson's ratio. A rigid body ignores them.
     penalty : float
@@ -122,8 +132,10 @@ class SceneArrays:
         return ~np.isin(np.arange(len(self.axes)), self.body_of_cell)
 
     def frames(self) -> FloatArray:
-        """Return the rotation (n_nodes, 2, 2) from the axes of each node's body to the global ones."""
+        """Return the rotation (n_nodes, dim, dim) from the axes of each node's body to the global ones."""
         first = self.axes[self.body_of_node]
+        if self.nodes.shape[1] == 3:
+            return np.stack([first[:, 0], first[:, 1], np.cross(first[:, 0], first[:, 1])], axis=2)
         return np.stack([first, np.column_stack([-first[:, 1], first[:, 0]])], axis=2)
 
     def to_arrays(self) -> dict[str, NDArray[Any]]:
@@ -143,7 +155,7 @@ class EngineAnswer:
 
     Attributes
     ----------
-    displacements : FloatArray, shape (n_nodes, 2)
+    displacements : FloatArray, shape (n_nodes, dim)
         The displacements of all nodes in global axes, a length each.
     converged : bool
         The code says that it has found a solution.
@@ -151,7 +163,7 @@ class EngineAnswer:
         The number of iterations that it took; −1 if it is not known.
     message : str
         What the code says of its end, in a line.
-    contact_forces : FloatArray | None, shape (n_nodes, 2)
+    contact_forces : FloatArray | None, shape (n_nodes, dim)
         The forces by which contact pushes the nodes, in global axes, if the code reports them.
     pressures : FloatArray | None, shape (n_slave_nodes,)
         The contact pressures at the nodes of the slave in the order of their numbers, if the code reports them.
@@ -166,7 +178,7 @@ class EngineAnswer:
 
     def flaw(self, scene: SceneArrays) -> str:
         """Return what is wrong with the answer to a scene, whatever its numbers mean; empty if nothing is."""
-        n_slave = len(np.unique(scene.slave))
+        n_slave = len(np.unique(scene.slave[scene.slave >= 0]))
         shapes = {"displacements": scene.nodes.shape, "contact_forces": scene.nodes.shape, "pressures": (n_slave,)}
         for name, shape in shapes.items():
             array = getattr(self, name)

@@ -32,7 +32,7 @@ from contactverif.contract.errors import (
 )
 from contactverif.contract.formulation import ContactPoints, Pairing
 from contactverif.contract.interface import PLANE, Interface, find_depth
-from contactverif.contract.traits import PatchPromises, Promises, Rules, Traits
+from contactverif.contract.traits import Abilities, PatchPromises, Promises, Rules, Traits
 
 _Value = TypeVar("_Value")
 
@@ -501,7 +501,8 @@ class EngineSubject(Subject):
         )
         # A stiffness of its own is near to none that gives way.
         enforcement = "multiplier" if traits.enforcement == "own" else traits.enforcement
-        self.traits = Traits(promises, Rules(enforcement, "distributed", "current"))
+        abilities = Abilities(dimensions=traits.dimensions, faces=(3, 4))
+        self.traits = Traits(promises, Rules(enforcement, "distributed", "current"), abilities=abilities)
         self.provides = frozenset({SOLVE})
         self.counts_multipliers = False
 

@@ -11,10 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from contactverif.contract.arrays import IntArray
+from contactverif.contract.arrays import FloatArray, IntArray
 from contactverif.contract.body import Body
 from contactverif.contract.errors import MisuseError
-from contactverif.contract.interface import Interface
+from contactverif.contract.interface import SPACE, Interface
 from contactverif.mechanics.bulk import CACHE_SIZE
 from contactverif.mechanics.scene import Scene
 
@@ -74,33 +74,39 @@ def move(interface: Interface, way: float) -> Interface:
     return moved
 
 
-def turn(scene: Scene, axis: tuple[float, float]) -> Scene:
-    """Return the scene turned about the origin, so that its x-axis becomes a unit vector; its facts are left out."""
-    rotation = np.array([[axis[0], -axis[1]], [axis[1], axis[0]]])
-    bodies = tuple(replace(body, nodes=body.nodes @ rotation.T, axis=rotation @ body.axis) for body in scene.bodies)
+def turn(scene: Scene, rotation: FloatArray) -> Scene:
+    """Return the scene turned about the origin by a rotation (dim, dim); its facts are left out."""
+    bodies = tuple(
+        replace(body, nodes=body.nodes @ rotation.T, axis=(rotation @ body.axis.T).T) for body in scene.bodies
+    )
     return replace(scene, bodies=bodies, facts={})
 
 
 def mirror(scene: Scene) -> Scene:
-    """Return the mirror image in the y-axis; cells and edges run the other way. Its facts are left out.
+    """Return the mirror image from x to −x; cells, edges and faces run the other way. Its facts are left out.
 
-    The first axis of each body becomes the opposite of its image, so that the second one is its image.
+    The first axis of each body becomes the opposite of its image, so that the others are their images.
     """
-    image = np.array([-1.0, 1.0])  # It takes places, and components along the new axes.
+    image = np.array([-1.0, 1.0, 1.0])[: scene.dim]  # It takes places, and components along the new axes.
+    signs = np.array([[-1.0], [1.0]]) if scene.dim == SPACE else -1.0
     bodies = tuple(
         replace(
             body,
             nodes=body.nodes * image + 0.0,
-            cells=body.cells[:, ::-1],
+            cells=body.cells[:, _MIRRORED.get((scene.dim, body.cells.shape[1]), slice(None, None, -1))],
             contact=body.contact[:, ::-1],
             imposed=body.imposed * image + 0.0,
             load=body.load * image + 0.0,
             start=body.start * image + 0.0,
-            axis=-image * body.axis + 0.0,
+            axis=signs * image * body.axis + 0.0,
         )
         for body in scene.bodies
     )
     return replace(scene, bodies=bodies, facts={})
+
+
+# {(dim, number of corners of a cell): the corners of its mirror image}; those of others run the other way.
+_MIRRORED = {(SPACE, 4): [2, 1, 0, 3], (SPACE, 8): [3, 2, 1, 0, 7, 6, 5, 4]}
 
 
 def renumber(scene: Scene, random: np.random.Generator) -> tuple[Scene, tuple[IntArray, ...]]:

@@ -14,6 +14,7 @@ from scipy import sparse
 from scipy.sparse import linalg
 
 from contactverif.contract.engine import EngineAnswer, EngineTraits, FloatArray, SceneArrays
+from contactverif_engines.faces import contact_in_space, node_areas
 
 _POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(3)
 _ITERATIONS = 60
@@ -26,32 +27,39 @@ _POSITION_ROUNDINGS = 2.0**-48  # A gap is a difference of coordinates, each rou
 class Control:
     """Distributed springs on the common mesh of both surfaces, seen along the normals of the slave's segments."""
 
-    traits = EngineTraits(
-        "penalty",
-        accuracy=1e-10,
-        inclined_supports=True,
-        passes_flat_patch=True,
-        converges=True,
-        source="springs in three Gauss points of each part that a slave and a master segment share",
-    )
+    dim: int = 2  # 3 takes scenes in space.
+
+    @property
+    def traits(self) -> EngineTraits:
+        """The statements of the control."""
+        return EngineTraits(
+            "penalty",
+            accuracy=1e-10,
+            inclined_supports=True,
+            passes_flat_patch=True,
+            converges=True,
+            source="springs in three Gauss points of each part that a slave and a master segment share",
+            dimensions=(self.dim,),
+        )
 
     def solve(self, scene: SceneArrays) -> EngineAnswer:
         """Solve a scene by steps with the stiffness of the springs that are closed, normals and places held."""
         stiffness, frames = assemble(scene), sparse.block_diag(list(scene.frames()), format="csr")
-        free = np.flatnonzero(~scene.fixed.reshape(-1))
+        free, shape = np.flatnonzero(~scene.fixed.reshape(-1)), scene.nodes.shape
+        find_contact = _contact if shape[1] == 2 else contact_in_space
         u = np.where(scene.fixed, scene.imposed, np.einsum("nij,ni->nj", scene.frames(), scene.start)).reshape(-1)
         step, rounding = np.inf, _POSITION_ROUNDINGS * float(np.abs(scene.nodes).max())
         for iteration in range(1, _ITERATIONS + 1):
-            positions = scene.nodes + (frames @ u).reshape(-1, 2)
-            forces, springs = _contact(scene, positions)
+            positions = scene.nodes + (frames @ u).reshape(shape)
+            forces, springs = find_contact(scene, positions)
             residual = stiffness @ u + frames.T @ forces - scene.load.reshape(-1)
             matrix = sparse.csc_array(stiffness + frames.T @ springs @ frames)[free][:, free]
             try:
                 change = linalg.splu(sparse.csc_matrix(matrix)).solve(-residual[free])
             except RuntimeError as error:
-                return EngineAnswer((frames @ u).reshape(-1, 2), False, iteration, str(error))
+                return EngineAnswer((frames @ u).reshape(shape), False, iteration, str(error))
             if not np.isfinite(change).all():
-                return EngineAnswer((frames @ u).reshape(-1, 2), False, iteration, "a singular matrix")
+                return EngineAnswer((frames @ u).reshape(shape), False, iteration, "a singular matrix")
             u[free] += change
             before, step = step, float(np.abs(change).max(initial=0.0))
             largest = float(np.abs(u).max())
@@ -59,12 +67,15 @@ class Control:
             if step <= _CONVERGED * largest or (step <= small and step >= before / 2):
                 break
         converged = step <= small
-        displacements = (frames @ u).reshape(-1, 2)
-        forces = -_contact(scene, scene.nodes + displacements)[0].reshape(-1, 2)
-        # The pressure is the force on each node of the slave over the length of its segments.
-        ends, nodes = scene.nodes[scene.slave], np.unique(scene.slave)
-        halves = np.repeat(np.hypot(*(ends[:, 1] - ends[:, 0]).T) / 2, 2)
-        pressures = np.asarray(np.hypot(*forces[nodes].T) / np.bincount(scene.slave.reshape(-1), halves)[nodes])
+        displacements = (frames @ u).reshape(shape)
+        forces = -find_contact(scene, scene.nodes + displacements)[0].reshape(shape)
+        nodes = np.unique(scene.slave[scene.slave >= 0])
+        if shape[1] == 3:
+            pressures = np.linalg.norm(forces[nodes], axis=1) / node_areas(scene)
+        else:  # The pressure is the force on each node of the slave over the length of its segments.
+            ends = scene.nodes[scene.slave]
+            halves = np.repeat(np.hypot(*(ends[:, 1] - ends[:, 0]).T) / 2, 2)
+            pressures = np.asarray(np.hypot(*forces[nodes].T) / np.bincount(scene.slave.reshape(-1), halves)[nodes])
         return EngineAnswer(displacements, converged, iteration, "" if converged else "no end", forces, pressures)
 
 
@@ -103,13 +114,13 @@ def _contact(scene: SceneArrays, positions: FloatArray) -> tuple[FloatArray, spa
 
 
 def assemble(scene: SceneArrays) -> sparse.csr_array:
-    """Return the stiffness (2 n_nodes, 2 n_nodes), row 2 × node + component, in the axes of each node's body."""
-    size = 2 * len(scene.nodes)
+    """Return the stiffness (dim n_nodes, dim n_nodes), row dim × node + component, in the axes of each node's body."""
+    size = scene.nodes.size
     total = sparse.csr_array((size, size))
-    triangles = scene.cells[:, 3] < 0
+    corners = (scene.cells >= 0).sum(axis=1)
     for index in np.unique(scene.body_of_cell):
-        for kind, n_corners in ((triangles, 3), (~triangles, 4)):
-            cells = scene.cells[kind & (scene.body_of_cell == index), :n_corners]
+        for n_corners in np.unique(corners).tolist():
+            cells = scene.cells[(corners == n_corners) & (scene.body_of_cell == index), :n_corners]
             if len(cells):
                 total = total + _one_body(scene, cells, scene.young[index], scene.poisson[index])
     frames = sparse.block_diag(list(scene.frames()), format="csr")
@@ -117,15 +128,23 @@ def assemble(scene: SceneArrays) -> sparse.csr_array:
 
 
 def _one_body(scene: SceneArrays, cells: Any, young: float, poisson: float) -> sparse.csr_array:
-    from skfem import Basis, ElementQuad1, ElementTriP1, ElementVector, MeshQuad, MeshTri, asm
+    import skfem
     from skfem.models.elasticity import lame_parameters, linear_elasticity
 
-    used, corners = np.unique(cells, return_inverse=True)
-    kind, element = (MeshTri, ElementTriP1()) if cells.shape[1] == 3 else (MeshQuad, ElementQuad1())
-    mesh = kind(*map(np.ascontiguousarray, (scene.nodes[used].T, corners.reshape(cells.shape).T)))
-    basis = Basis(mesh, ElementVector(element), intorder=4)
-    local = sparse.coo_array(asm(linear_elasticity(*lame_parameters(young, poisson)), basis))
-    order = np.empty(2 * len(used), np.int64)
-    order[basis.nodal_dofs.T.reshape(-1)] = (2 * used[:, None] + [0, 1]).reshape(-1)
-    size = 2 * len(scene.nodes)
-    return sparse.csr_array((local.data, (order[local.row], order[local.col])), shape=(size, size))
+    dim, n_corners = scene.nodes.shape[1], cells.shape[1]
+    kind, element, order = {
+        (2, 3): ("MeshTri", "ElementTriP1", range(3)),
+        (2, 4): ("MeshQuad", "ElementQuad1", range(4)),
+        (3, 4): ("MeshTet", "ElementTetP1", range(4)),
+        (3, 8): ("MeshHex", "ElementHex1", (6, 2, 5, 7, 1, 3, 4, 0)),  # scikit-fem numbers corners by coordinates.
+    }[dim, n_corners]
+    used, corners = np.unique(cells[:, order], return_inverse=True)
+    arrays = map(np.ascontiguousarray, (scene.nodes[used].T, corners.reshape(cells.shape).T))
+    basis = skfem.Basis(
+        getattr(skfem, kind)(*arrays), skfem.ElementVector(getattr(skfem, element)()), intorder=4 if dim == 2 else 2
+    )
+    local = sparse.coo_array(skfem.asm(linear_elasticity(*lame_parameters(young, poisson)), basis))
+    numbers = np.empty(dim * len(used), np.int64)
+    numbers[basis.nodal_dofs.T.reshape(-1)] = (dim * used[:, None] + np.arange(dim)).reshape(-1)
+    size = scene.nodes.size
+    return sparse.csr_array((local.data, (numbers[local.row], numbers[local.col])), shape=(size, size))

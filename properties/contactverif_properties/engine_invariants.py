@@ -1,6 +1,7 @@
 """Two scenes that have the same answer, as a whole code solves them: mirrored, in other units, beside other bodies."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from math import cos, degrees, radians, sin
 
@@ -8,6 +9,7 @@ import numpy as np
 
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case, Cases, random_source
+from contactverif.contract.interface import PLANE
 from contactverif.contract.property import Measurement, Property, Quantity
 from contactverif.contract.subject import SOLVE, EngineSubject, Subject
 from contactverif.mechanics import changed_scenes
@@ -15,6 +17,7 @@ from contactverif.mechanics.accuracy import Solution, solve_by_engine
 from contactverif.mechanics.bodies import Placing, Rectangle, block
 from contactverif.mechanics.scene import Scene, scene_of
 from contactverif.strategies.solids import closed_cases
+from contactverif.strategies.space_solids import space_closed_cases
 from contactverif_properties.patch_solved import engine_tolerance
 
 CHANGE = Quantity(
@@ -25,13 +28,18 @@ CHANGE = Quantity(
 LENGTH, MODULUS = 2.0**6, 4.0**-8  # Other units, and another one of force, which is their product
 DISTANCE = 64.0  # The distance of a far body over the size of the interface.
 ANGLES = (17.3, 45.0, 90.0, 135.0)  # Degrees
-IMAGE = np.diag([-1.0, 1.0])
+IMAGE = np.array([-1.0, 1.0, 1.0])
 
 
 # Blocks that are pressed together and tilted, all of the interface in contact; or a scene that is given.
 _tilted_scenes = random_source("contactverif_properties.engine_scenes.scenes")(lambda scene=None: closed_cases(scene))
 _define_for_codes = partial(
-    Property.define, quantities=(CHANGE,), cases=Cases.random(_tilted_scenes), needs=frozenset({SOLVE}), bodies=True
+    Property.define,
+    quantities=(CHANGE,),
+    cases=Cases.random(_tilted_scenes),
+    cases_in_space=Cases.random(space_closed_cases),
+    needs=frozenset({SOLVE}),
+    bodies=True,
 )
 
 
@@ -53,14 +61,14 @@ def _compare_scenes(
     total = float(np.linalg.norm(first.forces[: scene.interface.n_slave_nodes].sum(axis=0)))
     if total == 0:
         return Measurement([CHANGE.check(largest, 0.0)], idle=True).after(action)
-    length = float(scene.interface.slave.lengths(scene.interface.nodes).sum())
+    length = float(scene.interface.slave.measures(scene.interface.nodes).sum())
     tolerance = 2 * engine_tolerance(scene, first, subject.engine_traits.accuracy, total / length)
     return Measurement([CHANGE.check(largest / total, tolerance)]).after(action)
 
 
 def _by_body(scene: Scene, solution: Solution) -> list[FloatArray]:
     """Return the forces of all nodes of each body, 0 off the interface."""
-    values, first = [np.zeros((len(body.nodes), 2)) for body in scene.bodies], 0
+    values, first = [np.zeros(body.nodes.shape) for body in scene.bodies], 0
     for index in scene.bodies_in_reach:
         nodes = scene.bodies[index].contact_nodes
         values[index][nodes] = solution.forces[first : first + len(nodes)]
@@ -105,7 +113,7 @@ def engine_mirror(case: Case, subject: Subject) -> Measurement:
     **Undecided.** Where the code finds no solution.
     """
     changed = changed_scenes.mirror(scene_of(case))
-    return _compare_scenes(case, subject, changed, "mirrored from x to −x", lambda _, forces: forces @ IMAGE)
+    return _compare_scenes(case, subject, changed, "mirrored from x to −x", lambda _, forces: forces * IMAGE[: forces.shape[1]])
 
 
 @_define_for_codes(id="engine.renumbering")
@@ -141,8 +149,9 @@ def engine_units(case: Case, subject: Subject) -> Measurement:
     **Undecided.** Where the code finds no solution.
     """
     changed = changed_scenes.change_units(scene_of(case), LENGTH, MODULUS)
+    factor = LENGTH ** (changed.dim - 1) * MODULUS
     action = f"with all lengths times {LENGTH:g} and all moduli times {MODULUS:.4g}"
-    return _compare_scenes(case, subject, changed, action, lambda _, forces: forces / (LENGTH * MODULUS))
+    return _compare_scenes(case, subject, changed, action, lambda _, forces: forces / factor)
 
 
 @_define_for_codes(id="engine.swap", role="trait", promise=lambda traits: traits.promises.unbiased)
@@ -167,8 +176,8 @@ def engine_swap(case: Case, subject: Subject) -> Measurement:
 def engine_objectivity(case: Case, subject: Subject) -> Measurement:
     """A scene that is turned has the solution that is turned.
 
-    **Question.** A random scene of two blocks is turned by 17.3°, 45°, 90° or 135°, with its supports. Are the forces
-    that the bodies need the old ones, turned?
+    **Question.** A random scene of two blocks is turned by 17.3°, 45°, 90° or 135°, in space about two axes, with its
+    supports. Are the forces that the bodies need the old ones, turned?
 
     **Why it matters.** No machine is built along the axes of its drawing.
 
@@ -179,12 +188,13 @@ def engine_objectivity(case: Case, subject: Subject) -> Measurement:
     assert isinstance(subject, EngineSubject)
     if not subject.engine_traits.inclined_supports:
         return Measurement(undecided="the code takes no inclined supports")
-    angle = radians(float(_of_seed(case).choice(ANGLES)))
-    rotation = np.array([[cos(angle), -sin(angle)], [sin(angle), cos(angle)]])
+    angle, dim = radians(float(_of_seed(case).choice(ANGLES))), case.interface.dim
+    rotation = np.array([[cos(angle), -sin(angle), 0.0], [sin(angle), cos(angle), 0.0], [0.0, 0.0, 1.0]])
+    rotation = rotation[:dim, :dim] if dim == PLANE else rotation @ np.roll(rotation, 1, axis=(0, 1))
     return _compare_scenes(
         case,
         subject,
-        changed_scenes.turn(scene_of(case), (cos(angle), sin(angle))),
+        changed_scenes.turn(scene_of(case), rotation),
         f"turned by {degrees(angle):.4g}°",
         lambda _, forces: forces @ rotation,
     )
@@ -207,8 +217,13 @@ def engine_remote(case: Case, subject: Subject) -> Measurement:
     scene = scene_of(case)
     low, high = scene.interface.nodes.min(axis=0), scene.interface.nodes.max(axis=0)
     size = float(np.abs(high - low).max())
-    along_x, along_y = scene.bodies[0].frame[:, 0].tolist()  # Some codes take no inclined supports.
-    place = Placing((along_x, along_y), (float(low[0]) + DISTANCE * size, float(high[1])))
-    far = block(Rectangle([0, size / 3, size], [0, size]), contact="bottom", approach=0.0, placing=place, name="far")
+    if scene.dim == PLANE:
+        along_x, along_y = scene.bodies[0].frame[:, 0].tolist()  # Some codes take no inclined supports.
+        place = Placing((along_x, along_y), (float(low[0]) + DISTANCE * size, float(high[1])))
+        mesh = Rectangle([0, size / 3, size], [0, size])
+        far = block(mesh, contact="bottom", approach=0.0, placing=place, name="far")
+    else:  # A copy of the slave, whose far side is held where it is.
+        slave = scene.bodies[scene.slave[0]]
+        far = replace(slave, nodes=slave.nodes + DISTANCE * size * slave.frame[:, 0], imposed=0 * slave.imposed)
     changed = changed_scenes.add_body(scene, far)
     return _compare_scenes(case, subject, changed, f"beside a block {DISTANCE:g} sizes away")

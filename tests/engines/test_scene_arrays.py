@@ -35,7 +35,7 @@ def test_an_upright_scene_has_a_flat_interface_again() -> None:
 def test_bodies_with_different_axes_cannot_be_upright_together() -> None:
     scene = load_scene("c")
     first, second = scene.bodies
-    inclined = turn(scene, (0.6, 0.8)).bodies[1]
+    inclined = turn(scene, np.array([[0.6, -0.8], [0.8, 0.6]])).bodies[1]
     with pytest.raises(MisuseError, match="bodies with different axes"):
         Scene((first, inclined), penalty=1.0).arrays(upright=True)
     assert second is scene.bodies[1]
