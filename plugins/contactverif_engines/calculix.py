@@ -1,8 +1,8 @@
 """CalculiX (ccx): surfaces that touch by penalty springs or by multipliers of its mortar method.
 
 Source: G. Dhondt, CalculiX CrunchiX USER'S MANUAL version 2.20, keywords *CONTACT PAIR, *SURFACE BEHAVIOR, *CONTROLS.
-The deck is a layer of solids, since ccx knows contact in three dimensions alone. All displacements across it are held,
-so that it is in plane strain. ccx reads 20 characters of a number, and prints 7 digits.
+The deck of a plane scene is a layer of solids, since ccx knows contact in three dimensions alone. All displacements
+across it are held, so that it is in plane strain. ccx reads 20 characters of a number, and prints 7 digits.
 """
 
 from __future__ import annotations
@@ -16,13 +16,14 @@ from typing import Literal
 import numpy as np
 
 from contactverif.contract.engine import BoolArray, EngineAnswer, EngineTraits, FloatArray, IntArray, SceneArrays
-from contactverif_engines.plane import PlaneScene, make_plane
+from contactverif_engines.filled import FilledScene, fill_rigid_bodies
 
 FIELD = 20  # The characters of a number that ccx reads.
 Kind = Literal["surface", "nodes", "mortar", "linmortar"]
 _TYPES = {"surface": "SURFACE TO SURFACE", "nodes": "NODE TO SURFACE", "mortar": "MORTAR", "linmortar": "LINMORTAR"}
-# The faces of C3D6 and C3D8 by their corners, as the manual numbers them.
+# The faces of C3D4, C3D6 and C3D8 by their corners, as the manual numbers them.
 _FACES = {
+    4: ((0, 1, 2), (0, 3, 1), (1, 3, 2), (2, 3, 0)),
     6: ((0, 1, 2), (3, 4, 5), (0, 1, 4, 3), (1, 2, 5, 4), (2, 0, 3, 5)),
     8: ((0, 1, 2, 3), (4, 7, 6, 5), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7)),
 }
@@ -43,12 +44,15 @@ class CalculiX:
     # methods. All have linear springs of the stiffness ε̂.
     kind: Kind = "surface"
     program: str = "ccx"
+    dim: int = 2  # 3 takes scenes in space.
 
     @property
     def traits(self) -> EngineTraits:
         """The statements: what the manual states, and the digits that are printed."""
         passes, turns = None if self.kind == "nodes" else True, self.kind in ("surface", "nodes")
-        return EngineTraits("penalty", accuracy=1e-6, inclined_supports=turns, passes_flat_patch=passes)
+        return EngineTraits(
+            "penalty", accuracy=1e-6, inclined_supports=turns, passes_flat_patch=passes, dimensions=(self.dim,)
+        )
 
     def solve(self, scene: SceneArrays) -> EngineAnswer:
         """Write a deck, run ccx on it, and read the displacements that it prints."""
@@ -63,7 +67,7 @@ class CalculiX:
             text = printed.read_text(errors="replace") if printed.exists() else ""
             history = deck.with_suffix(".sta")
             steps = history.read_text(errors="replace") if history.exists() else ""
-        displacements, time = read_displacements(text, len(scene.nodes))
+        displacements, time = read_displacements(text, *scene.nodes.shape)
         converged = run.returncode == 0 and time == 1.0
         iterations = sum(int(line.split()[3]) for line in steps.splitlines() if line.split()[:1] == ["1"])
         message = "" if converged else _complaint(run.stdout)
@@ -79,22 +83,35 @@ def in_larger_units(scene: SceneArrays) -> SceneArrays:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Layer:
-    """A layer of solids over a plane scene, as thick as its largest body; the front has the first nodes."""
+    """A layer of solids over a plane scene, as thick as its largest body; the front has the first nodes.
 
-    plane: PlaneScene
+    A scene in space is its own layer: n nodes, and three components.
+    """
+
+    plane: FilledScene
     nodes: FloatArray  # (2 n, 3)
-    solids: tuple[tuple[IntArray, IntArray], ...]  # Wedges (n, 6), then bricks (n, 8), each with the body of each.
-    slave: IntArray  # (n_segments, 4): the faces of the slave, seen from outside of its body counter-clockwise.
+    # Wedges (n, 6), then bricks (n, 8), each with the body of each; in space tetrahedra (n, 4) are the first.
+    solids: tuple[tuple[IntArray, IntArray], ...]
+    # (n_faces, 4): the faces of the slave, seen from outside of its body counter-clockwise; −1 is a triangle's fourth.
+    slave: IntArray
     master: IntArray
     frames: FloatArray  # (2 n, 2, 2), as those of the plane; the rest, too.
     fixed: BoolArray  # (2 n, 2)
     imposed: FloatArray  # (2 n, 2)
     load: FloatArray  # (2 n, 2), that of the thickness, half of it on each side.
 
+    @property
+    def is_plane(self) -> bool:
+        """True if displacements across the layer are held."""
+        return self.fixed.shape[1] == 2
+
 
 def make_layer(scene: SceneArrays) -> Layer:
     """Return the layer of a scene."""
-    plane, thickness = make_plane(scene), scene.unit
+    plane, thickness = fill_rigid_bodies(scene), scene.unit
+    if scene.nodes.shape[1] == 3:
+        rest = plane.frames, plane.fixed, plane.imposed, plane.load
+        return Layer(plane, plane.nodes, plane.cells, scene.slave, scene.master, *rest)
     count = len(plane.nodes)
     frames, fixed, imposed, load = (
         np.concatenate([each, each]) for each in (plane.frames, plane.fixed, plane.imposed, plane.load)
@@ -123,7 +140,7 @@ def write_deck(layer: Layer, kind: Kind) -> list[str]:
         *_elements_and_surfaces(layer),
         *_materials(layer),
         *_turned_nodes(layer),
-        *(_springs_across(layer) if kind in ("mortar", "linmortar") else ()),
+        *(_springs_across(layer) if layer.is_plane and kind in ("mortar", "linmortar") else ()),
         *("*SURFACE INTERACTION, NAME=TOUCH", "*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR", stiffness),
         *(f"*CONTACT PAIR, INTERACTION=TOUCH, TYPE={_TYPES[kind]}", "SLAVE, MASTER"),
         *("*STEP, INC=1000", "*STATIC", "1., 1.", "*CONTROLS, PARAMETERS=FIELD", _FIELD),
@@ -145,7 +162,7 @@ def _elements_and_surfaces(layer: Layer) -> list[str]:
                 number += 1
     for name, surface in (("SLAVE", layer.slave), ("MASTER", layer.master)):
         lines.append(f"*SURFACE, NAME={name}, TYPE=ELEMENT")
-        lines += ["{}, S{}".format(*faces[frozenset(face)]) for face in surface.tolist()]
+        lines += ["{}, S{}".format(*faces[frozenset(face) - {-1}]) for face in surface.tolist()]
     return lines
 
 
@@ -168,7 +185,8 @@ def _springs_across(layer: Layer) -> list[str]:
 
 def _supports_and_loads(layer: Layer, kind: Kind) -> list[str]:
     sprung = set(np.unique(layer.slave).tolist()) if kind in ("mortar", "linmortar") else set[int]()
-    lines = ["*BOUNDARY", *(f"{node + 1}, 3, 3" for node in range(len(layer.nodes)) if node not in sprung)]
+    across = range(len(layer.nodes)) if layer.is_plane else ()
+    lines = ["*BOUNDARY", *(f"{node + 1}, 3, 3" for node in across if node not in sprung)]
     for node, part in np.argwhere(layer.fixed).tolist():
         lines.append(f"{node + 1}, {part + 1}, {part + 1}, {_number(layer.imposed[node, part])}")
     loaded = np.argwhere(layer.load != 0).tolist()
@@ -178,13 +196,15 @@ def _supports_and_loads(layer: Layer, kind: Kind) -> list[str]:
 
 def _turned_nodes(layer: Layer) -> list[str]:
     lines: list[str] = []
-    turned = np.flatnonzero((layer.frames != np.eye(2)).any(axis=(1, 2)))
-    axes, groups = np.unique(layer.frames[turned].reshape(-1, 4), axis=0, return_inverse=True)
+    dim = layer.fixed.shape[1]
+    turned = np.flatnonzero((layer.frames != np.eye(dim)).any(axis=(1, 2)))
+    axes, groups = np.unique(layer.frames[turned].reshape(-1, dim * dim), axis=0, return_inverse=True)
     for group, axis in enumerate(axes):
         lines.append(f"*NSET, NSET=T{group}")
         lines += [str(node + 1) for node in turned[groups.reshape(-1) == group].tolist()]
         lines.append(f"*TRANSFORM, NSET=T{group}, TYPE=R")
-        lines.append(", ".join(map(_number, [axis[0], axis[2], 0.0, axis[1], axis[3], 0.0])))
+        frame = np.pad(axis.reshape(dim, dim), ((0, 3 - dim), (0, 0)))
+        lines.append(", ".join(map(_number, frame[:, :2].T.reshape(-1))))
     return lines
 
 
@@ -198,15 +218,15 @@ def _number(value: float) -> str:
     return text if len(text) <= FIELD else f"{value:.{FIELD - 7}e}"
 
 
-def read_displacements(text: str, n_nodes: int) -> tuple[FloatArray, float]:
-    """Return the displacements (n_nodes, 2) of the front that were printed last, and the time; 0 if none were."""
-    displacements, time = np.zeros((n_nodes, 2)), 0.0
+def read_displacements(text: str, n_nodes: int, dim: int = 2) -> tuple[FloatArray, float]:
+    """Return the displacements (n_nodes, dim) of the front that were printed last, and the time; 0 if none were."""
+    displacements, time = np.zeros((n_nodes, dim)), 0.0
     for line in text.splitlines():
         words = line.split()
         if "displacements" in words:
             time = float(words[-1])
         elif len(words) == 4 and 1 <= int(words[0]) <= n_nodes:
-            displacements[int(words[0]) - 1] = [float(words[1]), float(words[2])]
+            displacements[int(words[0]) - 1] = list(map(float, words[1 : dim + 1]))
     return displacements, time
 
 

@@ -13,7 +13,7 @@ from typing import Any, Literal
 import numpy as np
 
 from contactverif.contract.engine import EngineAnswer, EngineTraits, FloatArray, IntArray, SceneArrays
-from contactverif_engines.plane import PlaneScene, deepen, make_plane
+from contactverif_engines.filled import FilledScene, deepen, fill_rigid_bodies
 
 _STEPS = 60
 _CONVERGED = 1e-11  # The norm of the last step over that of all displacements.
@@ -39,7 +39,7 @@ class Fedoo:
             warnings.simplefilter("ignore")
             import fedoo
 
-            plane = make_plane(scene)
+            plane = fill_rigid_bodies(scene)
             space = fedoo.ModelingSpace("2D", name="")
             bodies = _make_bodies(fedoo, plane, space)
             contacts = self._make_contacts(fedoo, plane, space)
@@ -54,7 +54,7 @@ class Fedoo:
         moves = np.array(problem.get_disp().T[: len(scene.nodes)])
         return EngineAnswer(moves, not message, message=message)
 
-    def _make_contacts(self, fedoo: Any, plane: PlaneScene, space: Any) -> list[Any]:
+    def _make_contacts(self, fedoo: Any, plane: FilledScene, space: Any) -> list[Any]:
         """Return the contact of each slave body with all masters, its springs as stiff as ε̂ in the mean.
 
         fedoo has its normals on the left of an edge, so that edges are turned around.
@@ -82,7 +82,7 @@ class Fedoo:
         return ""
 
 
-def _make_bodies(fedoo: Any, plane: PlaneScene, space: Any) -> list[Any]:
+def _make_bodies(fedoo: Any, plane: FilledScene, space: Any) -> list[Any]:
     assemblies = []
     for body, material in enumerate(plane.materials):
         for kind, (cells, bodies) in zip(("tri3", "quad4"), plane.cells, strict=True):
@@ -94,7 +94,7 @@ def _make_bodies(fedoo: Any, plane: PlaneScene, space: Any) -> list[Any]:
     return assemblies
 
 
-def _add_supports_and_loads(problem: Any, plane: PlaneScene) -> None:
+def _add_supports_and_loads(problem: Any, plane: FilledScene) -> None:
     for axis, name in enumerate(_AXES):
         if (supported := np.flatnonzero(plane.fixed[:, axis])).size:
             problem.bc.add("Dirichlet", supported, name, plane.imposed[supported, axis])

@@ -13,7 +13,7 @@ from typing import Any, Literal
 import numpy as np
 
 from contactverif.contract.engine import EngineAnswer, EngineTraits, FloatArray, IntArray, SceneArrays
-from contactverif_engines.plane import PlaneScene, make_plane
+from contactverif_engines.filled import FilledScene, fill_rigid_bodies
 
 _STEPS = 60
 _CONVERGED = 1e-13  # The last step over the largest displacement.
@@ -49,7 +49,7 @@ class GetFEM:
 
         gf.util_trace_level(0)
         gf.util_warning_level(0)
-        plane = make_plane(scene)
+        plane = fill_rigid_bodies(scene)
         is_slave = np.zeros(len(scene.axes), bool)
         is_slave[scene.body_of_node[scene.slave[:, 0]]] = True
         model = gf.Model("real")
@@ -93,7 +93,7 @@ class GetFEM:
 class _Side:
     """The bodies of a side as a mesh of GetFEM, with the numbers of its unknowns."""
 
-    def __init__(self, plane: PlaneScene, wanted: Any, edges: IntArray) -> None:
+    def __init__(self, plane: FilledScene, wanted: Any, edges: IntArray) -> None:
         import getfem as gf
 
         self.plane, self.mesh = plane, gf.Mesh("empty", 2)

@@ -18,7 +18,7 @@ from typing import Any, Literal
 import numpy as np
 
 from contactverif.contract.engine import EngineAnswer, EngineTraits, SceneArrays
-from contactverif_engines.plane import PlaneScene, make_plane
+from contactverif_engines.filled import FilledScene, fill_rigid_bodies
 
 # Kratos compares the sum of the squares of residuals with the first one, and their mean square with a number: the
 # defaults of 1e-4 and, in whatever unit, 1e-9 leave a hundredth of the first residual, or 3e-5.
@@ -27,6 +27,8 @@ _ROUNDOFF = 1e-13  # The share of loads or reactions that may be left.
 _GAP_ROUNDOFF = 1e-15  # The share of E times the largest coordinate, as gaps are differences of places.
 _ITERATIONS = 60
 _NORMALS = {"fixed": "no_derivatives_computation", "updated": "no_derivatives_computation_with_normal_update"}
+_LAWS = {2: "LinearElasticPlaneStrain2DLaw", 3: "LinearElastic3DLaw"}
+_CONDITIONS = {2: "LineCondition2D", 3: "SurfaceCondition3D"}
 _SEARCHES = {"boxes": "in_radius_with_obb", "radius": "in_radius"}
 _PROCESSES = {
     "multiplier": ("alm_contact_process", "ALMContactProcess", "ALMContactFrictionless"),
@@ -46,17 +48,23 @@ class Kratos:
     # Those of the start of a step, as Kratos chooses by itself, or of each iterate.
     normals: Literal["fixed", "updated"] = "fixed"
     augmentation: float = 1.0  # The penalty of the augmented Lagrangian method over E/h.
+    dim: int = 2  # 3 takes scenes in space.
 
     @property
     def traits(self) -> EngineTraits:
         """The statements. The penalty of Kratos is no stiffness of an area (`reports/findings`), so it is its own."""
-        if self.kind == "penalty":
-            return EngineTraits("own", accuracy=1e-8, load_scale=2.0**-10)
-        return EngineTraits("multiplier", accuracy=1e-8, load_scale=2.0**-10, passes_flat_patch=True)
+        own = self.kind == "penalty"
+        return EngineTraits(
+            "own" if own else "multiplier",
+            accuracy=1e-8,
+            load_scale=2.0**-10 if self.dim == 2 else 2.0**-20,
+            passes_flat_patch=None if own else True,
+            dimensions=(self.dim,),
+        )
 
     def solve(self, scene: SceneArrays) -> EngineAnswer:
         """Write a model, solve it in a static step, and read the displacements of its nodes."""
-        plane = make_plane(scene)
+        plane = fill_rigid_bodies(scene)
         with tempfile.TemporaryDirectory() as folder, _working_in(folder):
             import KratosMultiphysics as Kratos
             from KratosMultiphysics import ContactStructuralMechanicsApplication as Contact
@@ -74,11 +82,12 @@ class Kratos:
             part = model["Structure"]
             for node in part.Nodes:
                 index = node.Id - 1
-                for axis, variable in enumerate((Kratos.DISPLACEMENT_X, Kratos.DISPLACEMENT_Y)):
+                for axis, name in enumerate("XYZ"[: self.dim]):
+                    variable = getattr(Kratos, f"DISPLACEMENT_{name}")
                     if plane.fixed[index, axis]:
                         node.Fix(variable)
                         node.SetSolutionStepValue(variable, float(plane.imposed[index, axis]))
-                node.SetSolutionStepValue(Structural.POINT_LOAD, Kratos.Array3([*plane.load[index].tolist(), 0.0]))
+                node.SetSolutionStepValue(Structural.POINT_LOAD, Kratos.Array3([*plane.load[index].tolist(), 0.0][:3]))
             solver = job._GetSolver()
             job.time = solver.AdvanceInTime(job.time)
             job.InitializeSolutionStep()
@@ -88,11 +97,11 @@ class Kratos:
             except RuntimeError as error:  # Its solver of linear systems ends so where nothing holds a body.
                 return EngineAnswer(np.zeros_like(scene.nodes), False, message=str(error).strip().splitlines()[0])
             nodes = sorted(part.Nodes, key=lambda node: node.Id)[: len(scene.nodes)]
-            moves = np.array([list(node.GetSolutionStepValue(Kratos.DISPLACEMENT))[:2] for node in nodes])
+            moves = np.array([list(node.GetSolutionStepValue(Kratos.DISPLACEMENT))[: self.dim] for node in nodes])
             pressures = None
             if self.kind == "multiplier":  # Multipliers have a unit of their own, and press where they are negative.
                 name, unit = Contact.LAGRANGE_MULTIPLIER_CONTACT_PRESSURE, float(part.ProcessInfo[Kratos.SCALE_FACTOR])
-                slave = np.unique(scene.slave).tolist()
+                slave = np.unique(scene.slave[scene.slave >= 0]).tolist()
                 pressures = np.array([-unit * nodes[number].GetSolutionStepValue(name) for number in slave])
             iterations = int(part.ProcessInfo[Kratos.NL_ITERATION_NUMBER])
         message = "" if converged else "no convergence in one step"
@@ -117,7 +126,7 @@ class Kratos:
             },
             "solver_settings": {
                 "model_part_name": "Structure",
-                "domain_size": 2,
+                "domain_size": self.dim,
                 "echo_level": 0,
                 "analysis_type": "non_linear",
                 "solver_type": "Static",
@@ -167,34 +176,37 @@ def _working_in(folder: str) -> Iterator[None]:
         os.chdir(before)
 
 
-def write_model(plane: PlaneScene) -> list[str]:
+def write_model(plane: FilledScene) -> list[str]:
     """Return the lines of a model of Kratos: nodes, elements, edges, loads, and its parts."""
-    scene = plane.scene
+    scene, dim = plane.scene, plane.nodes.shape[1]
     lines = ["Begin ModelPartData", "End ModelPartData", "Begin Properties 0", "End Properties"]
-    lines += ["Begin Nodes", *(f"{n} {x!r} {y!r} 0.0" for n, (x, y) in enumerate(plane.nodes.tolist(), 1)), "End Nodes"]
+    places = np.pad(plane.nodes, ((0, 0), (0, 3 - dim))).tolist()
+    lines += ["Begin Nodes", *(f"{n} {x!r} {y!r} {z!r}" for n, (x, y, z) in enumerate(places, 1)), "End Nodes"]
     elements, parts = _elements(plane)
-    edges = np.vstack([scene.slave, scene.master])
-    rows = [f"{n} 0 {_words(edge + 1)}" for n, edge in enumerate(edges, 1)]
-    lines += [*elements, "Begin Conditions LineCondition2D2N", *rows, "End Conditions"]
+    edges = [edge[edge >= 0] + 1 for edge in (*scene.slave, *scene.master)]
+    lines += elements
+    for n_corners in sorted(set(map(len, edges))):
+        rows = [f"{n} 0 {_words(edge)}" for n, edge in enumerate(edges, 1) if len(edge) == n_corners]
+        lines += [f"Begin Conditions {_CONDITIONS[dim]}{n_corners}N", *rows, "End Conditions"]
     loaded = (np.flatnonzero(scene.load.any(axis=1)) + 1).tolist()
     points = range(len(edges) + 1, len(edges) + len(loaded) + 1)
     if loaded:
         rows = [f"{n} 0 {node}" for n, node in zip(points, loaded, strict=True)]
-        lines += ["Begin Conditions PointLoadCondition2D1N", *rows, "End Conditions"]
+        lines += [f"Begin Conditions PointLoadCondition{dim}D1N", *rows, "End Conditions"]
         parts += _part("Loaded", loaded, (), points)
-    slave = (np.unique(scene.slave) + 1).tolist()
-    parts += _part("Touching", (np.unique(edges) + 1).tolist(), (), range(1, len(edges) + 1))
+    slave, touching = (np.unique(np.concatenate(part)).tolist() for part in (edges[: len(scene.slave)], edges))
+    parts += _part("Touching", touching, (), range(1, len(edges) + 1))
     return lines + parts + _part("Slave", slave, (), range(1, len(scene.slave) + 1))
 
 
-def _elements(plane: PlaneScene) -> tuple[list[str], list[str]]:
-    lines, parts, first = list[str](), list[str](), 1
+def _elements(plane: FilledScene) -> tuple[list[str], list[str]]:
+    lines, parts, first, dim = list[str](), list[str](), 1, plane.nodes.shape[1]
     for body in range(len(plane.scene.axes)):
         begin, corners = first, list[Any]()
         for cells, bodies in plane.cells:
             of_body = cells[bodies == body]
             rows = [f"{n} 0 {_words(cell + 1)}" for n, cell in enumerate(of_body, first)]
-            begin_of_kind = f"Begin Elements SmallDisplacementElement2D{cells.shape[1]}N"
+            begin_of_kind = f"Begin Elements SmallDisplacementElement{dim}D{cells.shape[1]}N"
             lines += [begin_of_kind, *rows, "End Elements"] if rows else []
             corners.append(of_body.reshape(-1))
             first += len(of_body)
@@ -213,10 +225,10 @@ def _part(name: str, nodes: Sequence[int], elements: Sequence[int], conditions: 
     return [*lines, "End SubModelPart"]
 
 
-def _materials(plane: PlaneScene) -> dict[str, Any]:
+def _materials(plane: FilledScene) -> dict[str, Any]:
     materials = []
     for body, (young, poisson) in enumerate(plane.materials):
         values = {"YOUNG_MODULUS": young, "POISSON_RATIO": poisson}
-        law = {"constitutive_law": {"name": "LinearElasticPlaneStrain2DLaw"}, "Variables": values, "Tables": {}}
+        law = {"constitutive_law": {"name": _LAWS[plane.nodes.shape[1]]}, "Variables": values, "Tables": {}}
         materials.append({"model_part_name": f"Structure.Body{body}", "properties_id": body + 1, "Material": law})
     return {"properties": materials}

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from contactverif.contract.engine import EngineAnswer, EngineTraits, SceneArrays
-from contactverif_engines.plane import PlaneScene, make_plane
+from contactverif_engines.filled import FilledScene, fill_rigid_bodies
 
 _STEPS = 60
 _CONVERGED = 1e-13  # The last step over the largest displacement.
@@ -31,7 +31,7 @@ class NGSolve:
         """Make a mesh, find the minimum of the energy by Newton's method, and return its displacements."""
         import ngsolve as ng
 
-        plane = make_plane(scene)
+        plane = fill_rigid_bodies(scene)
         mesh, count = _make_mesh(plane), len(plane.nodes)
         space = ng.VectorH1(mesh, order=1)
         numbers = np.array([[space.GetDofNrs(ng.NodeId(ng.VERTEX, n))[part] for part in (0, 1)] for n in range(count)])
@@ -78,7 +78,7 @@ class NGSolve:
         return _STEPS + 1
 
 
-def _make_mesh(plane: PlaneScene) -> Any:
+def _make_mesh(plane: FilledScene) -> Any:
     import ngsolve as ng
     from netgen.meshing import Element1D, Element2D, FaceDescriptor, MeshPoint, Pnt
     from netgen.meshing import Mesh as NetgenMesh

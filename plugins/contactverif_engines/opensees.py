@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from contactverif.contract.engine import EngineAnswer, EngineTraits, IntArray, SceneArrays
-from contactverif_engines.plane import PlaneScene, make_plane
+from contactverif_engines.filled import FilledScene, fill_rigid_bodies
 
 _STEPS = 60
 _MANY = 60  # With the handler "Transformation" an element of 67 nodes damages memory (`reports/findings`).
@@ -34,7 +34,7 @@ class OpenSees:
         """Make a model, solve it in a static step, and read the displacements of its nodes."""
         import openseespy.opensees as ops
 
-        plane = make_plane(scene)
+        plane = fill_rigid_bodies(scene)
         ops.wipe()
         ops.model("basic", "-ndm", 2, "-ndf", 2)
         _add_bodies(ops, plane)
@@ -54,7 +54,7 @@ class OpenSees:
         ops.wipe()
         return EngineAnswer(moves, converged, n_steps, "" if converged else "analyze failed in one step")
 
-    def _add_contact(self, ops: Any, plane: PlaneScene) -> None:
+    def _add_contact(self, ops: Any, plane: FilledScene) -> None:
         scene, number = plane.scene, sum(len(cells) for cells, _ in plane.cells)
 
         def mean_length(chain: list[int]) -> float:
@@ -83,7 +83,7 @@ def find_chains(edges: IntArray) -> list[list[int]]:
     return chains
 
 
-def _add_bodies(ops: Any, plane: PlaneScene) -> None:
+def _add_bodies(ops: Any, plane: FilledScene) -> None:
     for number, (x, y) in enumerate(plane.nodes.tolist(), start=1):
         ops.node(number, x, y)
     for body, material in enumerate(plane.materials, start=1):
@@ -95,7 +95,7 @@ def _add_bodies(ops: Any, plane: PlaneScene) -> None:
             ops.element(kind, number, *cell, 1.0, "PlaneStrain", body + 1)
 
 
-def _add_supports_and_loads(ops: Any, plane: PlaneScene) -> None:
+def _add_supports_and_loads(ops: Any, plane: FilledScene) -> None:
     ops.timeSeries("Linear", 1)
     ops.pattern("Plain", 1, 1)
     supports = plane.fixed & (plane.imposed == 0)

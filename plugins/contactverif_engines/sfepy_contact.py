@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from contactverif.contract.engine import EngineAnswer, EngineTraits, IntArray, SceneArrays
-from contactverif_engines.plane import PlaneScene, deepen, make_plane
+from contactverif_engines.filled import FilledScene, deepen, fill_rigid_bodies
 
 _STEPS = 200
 _CONVERGED = 1e-10  # The norm of the residual over the size of forces.
@@ -36,7 +36,7 @@ class SfePy:
         from sfepy.solvers.nls import Newton
 
         output.set_output(quiet=True)
-        plane = make_plane(scene)
+        plane = fill_rigid_bodies(scene)
         if (cells := _cells_of_one_kind(plane)) is None:
             start = np.where(scene.fixed, scene.imposed, 0.0)
             return EngineAnswer(start, False, message="a field has triangles or quadrilaterals, and not both")
@@ -58,7 +58,7 @@ class SfePy:
 
 
 class _Model:
-    def __init__(self, plane: PlaneScene, cells: IntArray, bodies: IntArray) -> None:
+    def __init__(self, plane: FilledScene, cells: IntArray, bodies: IntArray) -> None:
         from sfepy.discrete import FieldVariable
         from sfepy.discrete.fem import FEDomain, Field, Mesh
 
@@ -120,7 +120,7 @@ class _Model:
         return np.sort(np.array([number[frozenset(edge)] for edge in edges], np.uint32))
 
 
-def _cells_of_one_kind(plane: PlaneScene) -> tuple[IntArray, IntArray] | None:
+def _cells_of_one_kind(plane: FilledScene) -> tuple[IntArray, IntArray] | None:
     """Return the cells and the body of each, quadrilaterals of rigid bodies halved where others are triangles."""
     (triangles, bodies), (quads, body_of_quad) = plane.cells
     if not len(triangles):

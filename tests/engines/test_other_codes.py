@@ -14,7 +14,7 @@ from contactverif.plugins.registry import load_engine
 from contactverif.problems.catalogue import load_scene_case
 from contactverif_engines.control import Control
 from contactverif_engines.opensees import find_chains
-from contactverif_engines.plane import deepen, make_plane
+from contactverif_engines.filled import deepen, fill_rigid_bodies
 
 MODULES = {"getfem": "getfem", "opensees": "openseespy", "fedoo": "fedoo", "sfepy": "sfepy"}
 
@@ -37,7 +37,7 @@ def test_chains_follow_their_edges() -> None:
 
 def test_slaves_that_touch_get_deeper() -> None:
     scene = load_scene("c").arrays(upright=True, lowered=True)
-    moves = deepen(make_plane(scene), 0.5)
+    moves = deepen(fill_rigid_bodies(scene), 0.5)
     slave, master = np.unique(scene.slave), np.unique(scene.master)
     np.testing.assert_allclose(moves[slave], np.tile([0.0, -0.5 * scene.unit], (len(slave), 1)))
     assert not moves[master].any()
