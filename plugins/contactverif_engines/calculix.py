@@ -33,7 +33,8 @@ _STIFF = 1e7  # The stiffness of springs that stand for supports, over E times a
 LEAST_MODULUS, LEAST_FORCE = 1e9, 1e10
 # The share of the mean force that may be out of balance, and of the step by which it may be corrected (5e-3 and 1e-2 by
 # default); the fifth number is the first one after nine iterations, the last one a residual without further tests.
-_FIELD = "1e-8, 1e-8, , , 1e-8, , , 1e-20"
+_FIELD = "{0}, 1e-8, , , {0}, , , 1e-20"
+_PLANE, _SPACE = "1e-8", "1e-5"  # In space stiff springs leave a roundoff of 1e-6 behind corrections of 1e-13.
 
 
 @dataclass(frozen=True)
@@ -133,6 +134,7 @@ def write_deck(layer: Layer, kind: Kind) -> list[str]:
     """Return the lines of the deck."""
     scene = layer.plane.scene
     tension = 1e-12 * float(scene.penalty) * scene.unit  # Springs at nodes keep it far from contact: none to speak of.
+    share = _PLANE if layer.is_plane else _SPACE
     stiffness = _number(scene.penalty) + (f", {_number(tension)}" if kind == "nodes" else "")
     return [
         "*NODE, NSET=ALL",
@@ -143,7 +145,7 @@ def write_deck(layer: Layer, kind: Kind) -> list[str]:
         *(_springs_across(layer) if layer.is_plane and kind in ("mortar", "linmortar") else ()),
         *("*SURFACE INTERACTION, NAME=TOUCH", "*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR", stiffness),
         *(f"*CONTACT PAIR, INTERACTION=TOUCH, TYPE={_TYPES[kind]}", "SLAVE, MASTER"),
-        *("*STEP, INC=1000", "*STATIC", "1., 1.", "*CONTROLS, PARAMETERS=FIELD", _FIELD),
+        *("*STEP, INC=1000", "*STATIC", "1., 1.", "*CONTROLS, PARAMETERS=FIELD", _FIELD.format(share)),
         *_supports_and_loads(layer, kind),
         *("*NODE PRINT, NSET=ALL, GLOBAL=YES", "U", "*END STEP"),
     ]
