@@ -63,7 +63,9 @@ class Choice:
 
 CHOICES = (
     Choice("control"),
+    Choice("control", "dim=3"),
     Choice("calculix"),
+    Choice("calculix", "dim=3"),
     Choice("calculix", "kind=nodes"),
     Choice("calculix", "kind=mortar"),
     Choice("calculix", "kind=linmortar"),
@@ -73,6 +75,8 @@ CHOICES = (
     Choice("kratos", "search_factor=10000", KRATOS),
     Choice("kratos", "search=radius,search_factor=10000,normals=updated,augmentation=1e-6", KRATOS),
     Choice("kratos", "kind=penalty", KRATOS),
+    Choice("kratos", "dim=3", KRATOS),
+    Choice("kratos", "dim=3,search=radius,search_factor=10000,normals=updated,augmentation=1e-6", KRATOS),
     Choice("ngsolve", "", ("ngsolve",)),
     Choice("ngsolve", "order=15", ("ngsolve",)),
     Choice("opensees", "", ("openseespy",)),

@@ -75,7 +75,7 @@ class Shells:
 
         from scipy.optimize import brentq  # It takes long to import, and the first rows of a run do not need it.
 
-        return float(brentq(depth, 0.0, self.interference / sum(compliances), xtol=1e-300, rtol=1e-14))
+        return float(brentq(depth, 0.0, 2 * self.interference / sum(compliances), xtol=1e-300, rtol=1e-14))
 
     def scene(self, *, inner_slave: bool, refine: int = 2, whole: bool = False) -> Scene:
         """Return an octant of both shells, 4r faces along an edge of the inner one on 3r, or whole ones."""

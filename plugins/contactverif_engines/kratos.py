@@ -56,8 +56,8 @@ class Kratos:
         own = self.kind == "penalty"
         return EngineTraits(
             "own" if own else "multiplier",
-            accuracy=1e-8,
-            load_scale=2.0**-10 if self.dim == 2 else 2.0**-20,
+            accuracy=1e-8 if self.dim == 2 else 1e-6,
+            load_scale=2.0**-10 if self.dim == 2 else 2.0**-16,
             passes_flat_patch=None if own else True,
             dimensions=(self.dim,),
         )
@@ -160,10 +160,12 @@ class Kratos:
 
 def _roundoff(scene: SceneArrays, kind: str) -> float:
     """Return the force that may be left as roundoff; the penalty of springs is 10⁴ E/h."""
-    place = float(scene.young[~scene.rigid].max()) * float(np.abs(scene.nodes).max())
-    moved = float(np.abs(scene.imposed).max(initial=0.0)) * float(scene.young.max())
+    space = scene.nodes.shape[1] == 3
+    across = scene.unit if space else 1.0  # In the plane forces are those of a unit of thickness.
+    place = float(scene.young[~scene.rigid].max()) * float(np.abs(scene.nodes).max()) * across
+    moved = float(np.abs(scene.imposed).max(initial=0.0)) * float(scene.young.max()) * across
     force = max(float(np.abs(scene.load).sum()), moved)  # The size of loads or reactions, whichever is larger.
-    return _ROUNDOFF * force + _GAP_ROUNDOFF * place * (1e4 if kind == "penalty" else 1.0)
+    return _ROUNDOFF * force + _GAP_ROUNDOFF * place * (1e4 if kind == "penalty" else 1e2 if space else 1.0)
 
 
 @contextmanager

@@ -12,7 +12,7 @@ import numpy as np
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import NO_CASES, Case, Cases
 from contactverif.contract.formulation import ContactPoints
-from contactverif.contract.interface import PLANE
+from contactverif.contract.interface import PLANE, TRIANGLE
 from contactverif.contract.property import Measure, Measurement, Property, Quantity, check_all
 from contactverif.contract.subject import EngineSubject, Subject
 from contactverif.contract.traits import Traits
@@ -187,7 +187,11 @@ TOTAL = Quantity(
     "0.08",
     "Five cells on 1.2 a, springs of 10 E/h and a rigid body that is not a parabola; right ones have 0.04.",
 )
-NODES = Quantity("error of nodal forces on a point contact", "0.16", "The mesh is coarse; right ones have 0.10.")
+NODES = Quantity(
+    "error of nodal forces on a point contact",
+    "0.16, with multipliers 0.24",
+    "The mesh is coarse; right ones have 0.10, and 0.17 where springs hardly give way.",
+)
 
 
 def _measure_point(case: Case, subject: Subject) -> Measurement:
@@ -198,7 +202,8 @@ def _measure_point(case: Case, subject: Subject) -> Measurement:
     total = abs(float(forces[:, 2].sum() / exact[:, 2].sum()) - 1)
     nodes = float(np.linalg.norm(forces - exact) / np.linalg.norm(exact))
     undecided = "" if solution.balanced else _name_failures({HERTZ_CELLS: solution.end}, "Newton's method")
-    return Measurement(check_all({TOTAL: total, NODES: nodes}, {TOTAL: 0.08, NODES: 0.16}), undecided)
+    most = 0.24 if subject.traits.rules.enforcement == "multiplier" else 0.16
+    return Measurement(check_all({TOTAL: total, NODES: nodes}, {TOTAL: 0.08, NODES: most}), undecided)
 
 
 @partial(_define(HERTZ_STUDIES), quantities=(*HERTZ_STUDIES.quantities, TOTAL, NODES))(
@@ -243,7 +248,8 @@ def accuracy_hertz(case: Case, subject: Subject) -> Measurement:
 
     In space a rigid paraboloid is pressed into a quarter of a box of side 3a whose far sides move as Boussinesq's
     half-space does, with five cells on 1.2 a and ε̂ = 10 E/h. The total force is right to 0.08, and the nodal forces to
-    0.16 in the mean square; right ones have 0.04 and 0.10.
+    0.16 in the mean square; right ones have 0.04 and 0.10. With multipliers 0.24 is allowed, as springs of 1e4 E/h have
+    0.17.
 
     The trait `converges` is the promise. `docs/concepts/accuracy.md` has a picture.
 
@@ -263,13 +269,15 @@ _SECOND_ORDER = (
 )
 EGG_BOX = Quantity(
     "extrapolated amplitude of the pressure",
-    "0.02",
-    "Errors of second order are taken away by two meshes, (4 e₂ − e₁)/3. Right ones reach 0.01.",
+    "0.02, with multipliers on tetrahedra 0.1",
+    "Errors of second order are taken away by two meshes, (4 e₂ − e₁)/3. Right ones reach 0.01. Springs that hardly give "
+    "way hide no error of the bodies: tetrahedra have 0.055 then.",
 )
 EGG_BOX_RATE = Quantity(
     "rate of the amplitude",
-    "1.6",
-    "It is 2. Right ones have 1.8 and more, where the finer mesh errs by more than 0.01.",
+    "1.6, with multipliers on tetrahedra 1.2",
+    "It is 2. Right ones have 1.8 and more, where the finer mesh errs by more than 0.01, and 1.27 on tetrahedra under "
+    "springs that hardly give way.",
     sense="at least",
 )
 _SMALL_AMPLITUDE = 0.01  # An error of the finer mesh up to this has no rate that says anything.
@@ -304,7 +312,8 @@ def accuracy_egg_box(case: Case, subject: Subject) -> Measurement:
     **How it is judged.** Meshes are 4r × 3r faces on 3r × 4r, r = 1 and 2, with ε̂ = 100 (E = 1000 and 300), and on
     hexahedra with 1e4, too. The amplitude is Σ F_i cos cos over the slave's nodes, over the same sum of the exact nodal
     forces. The exact one is h/(C + C + 1/ε̂) with the compliances C of layers on rollers. Its error is of second order:
-    (4 e₂ − e₁)/3 is at most 0.02, where 0.01 is measured. The rate is at least 1.6 where e₂ is above 0.01.
+    (4 e₂ − e₁)/3 is at most 0.02, where 0.01 is measured. The rate is at least 1.6 where e₂ is above 0.01. Multipliers
+    on tetrahedra may have 0.1 and 1.2, as springs of 1e6 have 0.044 and 1.27 there.
 
     **Undecided.** Where Newton's method finds no solution on one of the meshes.
 
@@ -321,9 +330,10 @@ def accuracy_egg_box(case: Case, subject: Subject) -> Measurement:
         errors.append(next(amplitudes) / next(amplitudes) - 1)
     solver = "the code" if isinstance(subject, EngineSubject) else "Newton's method"
     coarse, fine = errors
-    numbers = [EGG_BOX.check(abs(4 * fine - coarse) / 3, 0.02)]
+    stiff = subject.traits.rules.enforcement == "multiplier" and box.corners == TRIANGLE
+    numbers = [EGG_BOX.check(abs(4 * fine - coarse) / 3, 0.1 if stiff else 0.02)]
     if abs(fine) > _SMALL_AMPLITUDE:
-        numbers.append(EGG_BOX_RATE.check(float(np.log2(abs(coarse / fine))), 1.6))
+        numbers.append(EGG_BOX_RATE.check(float(np.log2(abs(coarse / fine))), 1.2 if stiff else 1.6))
     details = {"error at r = 1": coarse, "error at r = 2": fine}
     measurement = Measurement(numbers, _name_failures(ends, solver), details=details)
     return measurement.after("solved on this mesh and on one that is twice as fine")

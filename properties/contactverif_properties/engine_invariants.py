@@ -113,7 +113,9 @@ def engine_mirror(case: Case, subject: Subject) -> Measurement:
     **Undecided.** Where the code finds no solution.
     """
     changed = changed_scenes.mirror(scene_of(case))
-    return _compare_scenes(case, subject, changed, "mirrored from x to −x", lambda _, forces: forces * IMAGE[: forces.shape[1]])
+    return _compare_scenes(
+        case, subject, changed, "mirrored from x to −x", lambda _, forces: forces * IMAGE[: forces.shape[1]]
+    )
 
 
 @_define_for_codes(id="engine.renumbering")
