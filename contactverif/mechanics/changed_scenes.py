@@ -117,6 +117,8 @@ def renumber(scene: Scene, random: np.random.Generator) -> tuple[Scene, tuple[In
         old = np.argsort(new)
         arrays: dict[str, Any] = {name: getattr(body, name)[old] for name in ("nodes", "fixed", "imposed", "load")}
         arrays |= {name: random.permutation(new[getattr(body, name)]) for name in ("cells", "contact")}
+        if scene.dim == SPACE:  # A face may begin at any of its corners.
+            arrays["contact"] = np.array([np.roll(face, random.integers(len(face))) for face in arrays["contact"]])
         bodies.append(replace(body, **arrays))
         numbers.append(new)
     return replace(scene, bodies=tuple(bodies), facts={}), tuple(numbers)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy import sparse
 
-from contactverif.contract.engine import FloatArray, IntArray, SceneArrays
+from contactverif.contract.engine import FloatArray, SceneArrays
 
 _POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(3)
 # Points and weights on a triangle whose first corner is where all lines of a square meet; the area is 1/2.
@@ -99,7 +99,7 @@ def _common_points(first: FloatArray, second: FloatArray) -> tuple[FloatArray, F
 
 def _shapes(corners: FloatArray, points: FloatArray) -> FloatArray:
     """Return the shape functions (n, n_corners) of a flat triangle or quadrilateral at points (n, 2)."""
-    first, second, *_, last = corners - corners[0]
+    second, last = corners[1] - corners[0], corners[-1] - corners[0]
     if len(corners) == 3:
         shares = np.linalg.solve(np.stack([second, last], axis=1), (points - corners[0]).T)
         return np.stack([1 - shares.sum(axis=0), *shares], axis=1)

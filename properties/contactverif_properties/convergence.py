@@ -270,8 +270,8 @@ _SECOND_ORDER = (
 EGG_BOX = Quantity(
     "extrapolated amplitude of the pressure",
     "0.02, with multipliers on tetrahedra 0.1",
-    "Errors of second order are taken away by two meshes, (4 e₂ − e₁)/3. Right ones reach 0.01. Springs that hardly give "
-    "way hide no error of the bodies: tetrahedra have 0.055 then.",
+    "Errors of second order are taken away by two meshes, (4 e₂ − e₁)/3. Right ones reach 0.01. Springs that hardly "
+    "give way hide no error of the bodies: tetrahedra have 0.055 then.",
 )
 EGG_BOX_RATE = Quantity(
     "rate of the amplitude",

@@ -13,8 +13,8 @@ from contactverif.isolation.limits import Limits
 from contactverif.plugins.registry import load_engine
 from contactverif.problems.catalogue import load_scene_case
 from contactverif_engines.control import Control
-from contactverif_engines.opensees import find_chains
 from contactverif_engines.filled import deepen, fill_rigid_bodies
+from contactverif_engines.opensees import find_chains
 
 MODULES = {"getfem": "getfem", "opensees": "openseespy", "fedoo": "fedoo", "sfepy": "sfepy"}
 

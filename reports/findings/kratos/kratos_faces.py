@@ -1,0 +1,29 @@
+"""The area that Kratos finds two faces in the plane z = 0 share, by its own utility of exact integration."""
+
+import KratosMultiphysics as Kratos
+
+# The corners of a slave and of a master face, counter-clockwise from above, and the area that they share.
+FACES = {
+    "rectangles": ([(0, 1), (3, 1), (3, 3), (0, 3)], [(2, 0), (3, 0), (3, 2), (2, 2)], 1.0),
+    "a triangle on a rectangle": ([(0, 3), (4, 3), (2, 4)], [(0, 0), (3, 0), (3, 4), (0, 4)], 1.75),
+    "triangles": ([(0, 4), (1, 0), (3, 4)], [(4, 2), (4, 4), (1, 4)], 1.0),
+    "triangles with a node in common": ([(0, 0), (3, 2), (1, 3)], [(2, 2), (0, 0), (2, 0)], 2 / 3),
+}
+
+
+def common_area(slave, master):
+    """Return the area of the common part of two faces, each a list of corners (x, y), counter-clockwise from above."""
+    part = Kratos.Model().CreateModelPart("Faces")
+    part.AddNodalSolutionStepVariable(Kratos.NORMAL)
+    values, conditions, first = part.CreateNewProperties(0), [], 1
+    for number, (corners, up) in enumerate(((slave[::-1], -1.0), (master, 1.0)), 1):
+        numbers = list(range(first, first + len(corners)))
+        for node, (x, y) in zip(numbers, corners):
+            normal = Kratos.Array3([0.0, 0.0, up])
+            part.CreateNewNode(node, float(x), float(y), 0.0).SetSolutionStepValue(Kratos.NORMAL, normal)
+        conditions.append(part.CreateNewCondition(f"SurfaceCondition3D{len(corners)}N", number, numbers, values))
+        conditions[-1].SetValue(Kratos.NORMAL, Kratos.Vector([0.0, 0.0, up]))
+        first += len(corners)
+    kind = f"3D{len(slave)}N" + (f"{len(master)}N" if len(master) != len(slave) else "")
+    utility = getattr(Kratos, f"ExactMortarIntegrationUtility{kind}")(2)  # Two Gauss points along each side of a part.
+    return utility.TestGetExactAreaIntegration(*conditions)
