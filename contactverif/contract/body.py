@@ -118,8 +118,8 @@ class Body:
         if self.rigid and not self.fixed.all():
             self._refuse("fixed", "a free node of a rigid body", "every component of every node fixed")
         if len(bad := np.flatnonzero((self._turns <= 0).any(axis=1))):
-            shape, needed = ("clockwise", "convex, counter-clockwise") if dim == PLANE else ("inside out", "convex")
-            self._refuse("cells", f"cell {bad[0]}, which is {shape}, folded or flat", needed)
+            flaw, needed = ("clockwise", "convex, counter-clockwise") if dim == PLANE else ("inside out", "convex")
+            self._refuse("cells", f"cell {bad[0]}, which is {flaw}, folded or flat", needed)
         if fault:
             self._refuse(*fault)
 

@@ -46,7 +46,7 @@ class SpaceMotion:
     @property
     def normal(self) -> FloatArray:
         """The unit vector (3,) that the z-axis becomes."""
-        return self.axes[2]
+        return np.asarray(self.axes[2])
 
     def __call__(self, points: FloatArray) -> FloatArray:
         """Return the points (n, 3), moved; each coordinate is rounded once, from extended precision."""

@@ -104,7 +104,7 @@ class Layer:
     @property
     def is_plane(self) -> bool:
         """True if displacements across the layer are held."""
-        return self.fixed.shape[1] == 2
+        return bool(self.fixed.shape[1] == 2)
 
 
 def make_layer(scene: SceneArrays) -> Layer:
