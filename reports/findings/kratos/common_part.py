@@ -3,4 +3,5 @@
 from kratos_faces import FACES, common_area
 
 for name, (slave, master, right) in FACES.items():
-    print(f"{name}: {common_area(slave, master):.6f} found, {right:.6f} right")
+    areas = " and ".join(f"{common_area(slave, master, tessellation):.6f}" for tessellation in (False, True))
+    print(f"{name}: {areas} found, {right:.6f} right")

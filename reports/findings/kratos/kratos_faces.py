@@ -11,8 +11,8 @@ FACES = {
 }
 
 
-def common_area(slave, master):
-    """Return the area of the common part of two faces, each a list of corners (x, y), counter-clockwise from above."""
+def common_area(slave, master, tessellation=False):
+    """Return the area that Kratos finds; `tessellation` is its option `consider_tessellation`, false by default."""
     part = Kratos.Model().CreateModelPart("Faces")
     part.AddNodalSolutionStepVariable(Kratos.NORMAL)
     values, conditions, first = part.CreateNewProperties(0), [], 1
@@ -25,5 +25,5 @@ def common_area(slave, master):
         conditions[-1].SetValue(Kratos.NORMAL, Kratos.Vector([0.0, 0.0, up]))
         first += len(corners)
     kind = f"3D{len(slave)}N" + (f"{len(master)}N" if len(master) != len(slave) else "")
-    utility = getattr(Kratos, f"ExactMortarIntegrationUtility{kind}")(2)  # Two Gauss points along each side of a part.
+    utility = getattr(Kratos, f"ExactMortarIntegrationUtility{kind}")(2, 1e10, 0, 1.0, tessellation)
     return utility.TestGetExactAreaIntegration(*conditions)
