@@ -125,6 +125,8 @@ class SceneArrays:
                 array = np.array(getattr(self, entry.name), _KINDS[str(entry.type)])
                 array.flags.writeable = False
                 object.__setattr__(self, entry.name, array)
+        if self.nodes.shape[1] == 2:  # The first rows of a frame are one axis there.
+            object.__setattr__(self, "axes", self.axes.reshape(-1, 2))
 
     @property
     def rigid(self) -> BoolArray:

@@ -18,7 +18,7 @@ def common_area(slave, master, tessellation=False):
     values, conditions, first = part.CreateNewProperties(0), [], 1
     for number, (corners, up) in enumerate(((slave[::-1], -1.0), (master, 1.0)), 1):
         numbers = list(range(first, first + len(corners)))
-        for node, (x, y) in zip(numbers, corners):
+        for node, (x, y) in zip(numbers, corners, strict=True):
             normal = Kratos.Array3([0.0, 0.0, up])
             part.CreateNewNode(node, float(x), float(y), 0.0).SetSolutionStepValue(Kratos.NORMAL, normal)
         conditions.append(part.CreateNewCondition(f"SurfaceCondition3D{len(corners)}N", number, numbers, values))
