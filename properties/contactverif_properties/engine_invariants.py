@@ -122,8 +122,8 @@ def engine_mirror(case: Case, subject: Subject) -> Measurement:
 def engine_renumbering(case: Case, subject: Subject) -> Measurement:
     """Other numbers of nodes, cells and edges change nothing.
 
-    **Question.** Nodes, cells and contact edges of a random scene get other numbers. Are the forces that the bodies
-    need the old ones?
+    **Question.** Nodes, cells and contact edges of a random scene get other numbers, and in space faces begin at other
+    corners. Are the forces that the bodies need the old ones?
 
     **Why it matters.** A mesh generator numbers as it likes.
 
