@@ -470,34 +470,36 @@ ONE_SIDED = 0.5
 
 
 def ways_to_master(interface: Interface) -> tuple[FloatArray, FloatArray]:
-    """Return how far each slave node (n_slave_nodes,) is from the master, and the unit vector (n, 2) along which.
+    """Return how far each slave node (n_slave_nodes,) is from the master, and the unit vector (n, dim) along which.
 
     Nodes look along the mean normal of the slave; around a ring each looks along its own. The way is a length, negative
     where the node is inside the master, and infinite where the node does not see the master.
     """
     surface, nodes, n_slave = interface.slave, interface.nodes, interface.n_slave_nodes
-    mean, directions = mean_normal(surface, nodes), np.zeros((n_slave, 2))
-    if np.hypot(*mean) > ONE_SIDED:
-        directions[:] = mean / np.hypot(*mean)
+    mean, directions = mean_normal(surface, nodes), np.zeros((n_slave, interface.dim))
+    if np.linalg.norm(mean) > ONE_SIDED:
+        directions[:] = mean / np.linalg.norm(mean)
     else:
-        along = np.diff(nodes[surface.segments], axis=1)[:, 0]
-        for end in surface.segments.T:
-            np.add.at(directions, end, np.column_stack([along[:, 1], -along[:, 0]]))
-        lengths = np.hypot(*directions.T)[:, None]
+        normals = surface.measures(nodes)[:, None] * unit_normals(nodes[surface.faces])
+        for corner in surface.faces.T:
+            np.add.at(directions, corner, normals)
+        lengths = np.linalg.norm(directions, axis=1)[:, None]
         directions /= np.where(lengths > 0, lengths, 1.0)
     pairs = zip(nodes[:n_slave], directions, strict=True)
     return np.array([_way_along(interface, point, direction) for point, direction in pairs]), directions
 
 
 def mean_normal(surface: Surface, nodes: FloatArray) -> FloatArray:
-    """Return the mean normal (2,) out of the body, weighted by length: shorter than 1 where the surface is bent."""
-    along = np.diff(nodes[surface.segments], axis=1)[:, 0]
-    normal: FloatArray = np.array([along[:, 1].sum(), -along[:, 0].sum()]) / np.hypot(*along.T).sum()
+    """Return the mean normal (dim,) out of the body, weighted by size: shorter than 1 where the surface is bent."""
+    sizes = surface.measures(nodes)
+    normal: FloatArray = sizes @ unit_normals(nodes[surface.faces]) / sizes.sum()
     return normal
 
 
 def _way_along(interface: Interface, point: FloatArray, direction: FloatArray) -> float:
-    """Return the shortest way, forwards or backwards, from a point (2,) to a master segment that faces it."""
+    """Return the shortest way, forwards or backwards, from a point (dim,) to a master segment or face that faces it."""
+    if interface.dim != PLANE:
+        return _way_to_faces(interface.nodes[interface.master.faces], point, direction)
     first, second = np.moveaxis(interface.nodes[interface.master.segments], 1, 0)
     along, apart = second - first, first - point
     facing = direction[0] * along[:, 1] - direction[1] * along[:, 0]  # −|along| where the normals oppose each other.
@@ -508,6 +510,20 @@ def _way_along(interface: Interface, point: FloatArray, direction: FloatArray) -
     return float(ways[np.argmin(np.abs(ways))]) if len(ways) else np.inf
 
 
+def _way_to_faces(faces: FloatArray, point: FloatArray, direction: FloatArray) -> float:
+    """Return the shortest way from a point to faces (n_faces, n_corners, 3), quadrilaterals as two triangles each."""
+    parts = [faces[:, [0, corner, corner + 1]] for corner in range(1, faces.shape[1] - 1)]
+    first, second, third = (corner - point for corner in np.moveaxis(np.concatenate(parts), 1, 0))
+    normals = np.cross(second - first, third - first)
+    facing, sizes = normals @ direction, np.linalg.norm(normals, axis=1)
+    facing = np.where(facing < -STEEPEST_FACING * sizes, facing, np.nan)
+    pairs = (first, second), (second, third), (third, first)
+    shares = np.array([np.cross(*pair) @ direction for pair in pairs]) / facing
+    ways = ((first * normals).sum(axis=1) / facing)[(shares >= -_EDGE).all(axis=0)]
+    return float(ways[np.argmin(np.abs(ways))]) if len(ways) else np.inf
+
+
+_EDGE = 1e-9  # A node on an edge is seen, whatever rounding says.
 _AT_ONCE = 256  # Points that are compared with all master faces at once, so that memory stays small.
 _TIED = 1 + 1e-9  # Faces are equally near if distances differ by less: far more than rounding, far less than a mesh.
 

@@ -1,6 +1,6 @@
-"""A user's own mesh file becomes a `Scene`: the cells beside slave and master lines are elastic bodies.
+"""A user's own mesh file becomes a `Scene`: the cells beside slave and master lines or faces are elastic bodies.
 
-Cells that share nodes are one body, and lines without cells beside them are a rigid one.
+Cells that share nodes are one body, and lines or faces without cells beside them are a rigid one.
 
 Rule for the next editor: an error is said in terms of the options of the command line.
 """
@@ -16,10 +16,10 @@ import numpy as np
 from contactverif.contract.arrays import BoolArray, FloatArray, IntArray
 from contactverif.contract.body import Body
 from contactverif.contract.errors import MisuseError
-from contactverif.contract.interface import ONE_SIDED, Surface, mean_normal, ways_to_master
+from contactverif.contract.interface import ONE_SIDED, PLANE, Surface, mean_normal, unit_normals, ways_to_master
 from contactverif.mechanics.bodies import turn_counter_clockwise
 from contactverif.mechanics.scene import Scene
-from contactverif.meshes.cell_sides import describe, label_bodies, plane_cells
+from contactverif.meshes.cell_sides import CellSides, describe, label_bodies, plane_cells
 from contactverif.meshes.mesh_file import Flip, MeshSides, read_sides
 from contactverif.meshes.plain_mesh import find_group
 
@@ -30,8 +30,12 @@ CLOSED = 0.8  # The supports push the slave until this share of its nodes would 
 LEAST_DEPTH = 0.01  # They push it further by this share of its height, so that pressures are not zero.
 DEEPEST = 0.02  # No node is pushed deeper than this share of the height: linear elasticity is meant for small strains.
 
+_SOLIDS = "tetra", "hexahedron", "wedge", "pyramid"  # Parts of the names of cells with a volume.
+_SHAPES = {4: "tetrahedra", 5: "pyramids", 6: "wedges", 8: "hexahedra"}
+_KINDS = {(2, 3): "triangle", (2, 4): "quad", (3, 4): "tetra", (3, 8): "hexahedron"}
+
 Material = tuple[float, float]
-Support = tuple[float | None, float | None]
+Support = tuple[float | None, ...]
 
 
 def read_scene(
@@ -44,7 +48,7 @@ def read_scene(
     materials: Mapping[str, Material] | None = None,
     supports: Mapping[str, Support] | None = None,
 ) -> Scene:
-    """Read the two bodies around the interface between two groups of 2-node lines from a mesh file.
+    """Read the two bodies around the interface between two groups of 2-node lines, or of faces, from a mesh file.
 
     A body whose supports are not given is held where its boundary looks away from the contact. That of the slave is
     pushed towards the master, unless some given support moves. What the reader has to say goes to standard error.
@@ -60,8 +64,8 @@ def read_scene(
     materials : Mapping[str, tuple[float, float]] | None
         {group: (Young's modulus, Poisson's ratio)}. The bodies to which members of the group belong have this
         material; the others have that of the file, or else E = 1, ν = 0.3.
-    supports : Mapping[str, tuple[float | None, float | None]] | None
-        {group: displacement along x and y, a length each}; None where the nodes of the group are free to move.
+    supports : Mapping[str, tuple[float | None, ...]] | None
+        {group: displacement along x and y, in space z, a length each}; None where the nodes of the group are free.
 
     Returns
     -------
@@ -87,8 +91,6 @@ def read_scene(
 
 def scene_of(sides: MeshSides, materials: Mapping[str, Material], supports: Mapping[str, Support]) -> Scene:
     """Return the scene of the sides of a mesh; arguments and errors are those of `read_scene`."""
-    if sides.points.shape[1] == 3:
-        raise MisuseError("--mesh", "faces in space", "lines in a plane: bodies in space are not solved")
     parts = _parts(sides)
     _set_materials(sides, parts, sides.mesh.materials, given=False)
     _set_materials(sides, parts, materials, given=True)
@@ -115,7 +117,8 @@ def describe_bodies(scene: Scene) -> list[str]:
         words = f"{len(body.cells)} cells, E = {body.young:g}, ν = {body.poisson:g}" if not body.rigid else "rigid"
         supports = body.fixed.any(axis=1)
         moves = np.unique(np.round(body.imposed[supports], 12), axis=0)
-        way = f"moved by ({moves[0, 0]:.3g}, {moves[0, 1]:.3g})" if len(moves) == 1 else "moved by several ways"
+        each_way = ", ".join(f"{move:.3g}" for move in moves[0]) if len(moves) == 1 else ""
+        way = f"moved by ({each_way})" if each_way else "moved by several ways"
         lines.append(f"{side}: {words}, {supports.sum()} nodes held" + (f", {way}" if moves.any() else ""))
     return lines
 
@@ -137,40 +140,65 @@ class _Part:
 
     @property
     def normal(self) -> FloatArray:
-        """The mean normal (2,) of the contact boundary, out of the body; 0 around a ring."""
+        """The mean normal (dim,) of the contact boundary, out of the body; 0 around a ring."""
         normal = mean_normal(Surface(self.contact), self.nodes)
-        length = np.hypot(*normal)
-        return normal / length if length > ONE_SIDED else np.zeros(2)
+        length = np.linalg.norm(normal)
+        return normal / length if length > ONE_SIDED else np.zeros(len(normal))
 
 
 def _parts(sides: MeshSides) -> list[_Part]:
     """Return the bodies that slave or master lines belong to, slaves first, without material and supports."""
-    corners = plane_cells(sides.mesh.cells).values()
-    blocks = [turn_counter_clockwise(sides.points, each) for each in corners]
+    dim = sides.points.shape[1]
+    if dim == PLANE:
+        blocks = [turn_counter_clockwise(sides.points, each) for each in plane_cells(sides.mesh.cells).values()]
+    else:
+        solids = {
+            kind: data for kind, data in sides.mesh.cells.items() if any(name in kind.lower() for name in _SOLIDS)
+        }
+        blocks = [_turn_outside(sides.points, data) for data in solids.values()]
     labels = label_bodies([*blocks, sides.slave, sides.master], len(sides.points))
     of_slave, of_master = np.unique(labels[sides.slave]), np.unique(labels[sides.master])
     if both := set(of_slave.tolist()) & set(of_master.tolist()):
         node = sides.slave[np.isin(labels[sides.slave[:, 0]], list(both))][0, 0]
-        actual = f"lines of the body that has slave lines too, at {describe(sides.points[node])}"
+        word = "lines" if dim == PLANE else "faces"
+        actual = f"{word} of the body that has slave {word} too, at {describe(sides.points[node])}"
         raise MisuseError("--master", actual, "slave and master on bodies without a common node")
     parts = []
     for side, lines, its_labels in (("slave", sides.slave, of_slave), ("master", sides.master, of_master)):
         for label in its_labels:
-            cells = _one_shape([block[labels[block[:, 0]] == label] for block in blocks])
+            cells = _one_shape([block[labels[block[:, 0]] == label] for block in blocks], dim)
             edges = lines[labels[lines[:, 0]] == label]
             numbers = np.unique(np.concatenate([cells.reshape(-1), edges.reshape(-1)]))
             its_cells, contact = np.searchsorted(numbers, cells), np.searchsorted(numbers, edges)
-            shape, rigid = (len(numbers), 2), not len(cells)
+            shape, rigid = (len(numbers), dim), not len(cells)
             fixed, imposed = np.full(shape, rigid), np.zeros(shape)
             parts.append(_Part(side, numbers, sides.points[numbers], its_cells, contact, fixed, imposed))
     return parts
 
 
-def _one_shape(blocks: list[IntArray]) -> IntArray:
-    """Return cells (n_cells, 3 or 4) of one shape: where there are triangles too, a quadrilateral is two triangles."""
+def _turn_outside(points: FloatArray, cells: IntArray) -> IntArray:
+    """Return cells (n_cells, n_corners), of tetrahedra and hexahedra those turned that are inside out."""
+    if cells.shape[1] not in (4, 8):
+        return cells
+    ends, turned = ([1, 2, 3], [0, 2, 1, 3]) if cells.shape[1] == 4 else ([1, 3, 4], [4, 5, 6, 7, 0, 1, 2, 3])
+    volumes = np.linalg.det(points[cells[:, ends]] - points[cells[:, :1]])
+    return np.where(volumes[:, None] < 0, cells[:, turned], cells)
+
+
+def _one_shape(blocks: list[IntArray], dim: int) -> IntArray:
+    """Return cells (n_cells, n_corners) of one shape.
+
+    In the plane a quadrilateral is two triangles where there are triangles too. In space there are no such bodies.
+    """
     blocks = [block for block in blocks if len(block)]
     if not blocks:
-        return np.zeros((0, 4), dtype=np.int64)
+        return np.zeros((0, 2**dim), dtype=np.int64)
+    if dim != PLANE:
+        shapes = sorted({block.shape[1] for block in blocks})
+        if shapes not in ([4], [8]):
+            listed = " and ".join(_SHAPES.get(count, f"cells of {count} nodes") for count in shapes)
+            raise MisuseError("--mesh", f"a body of {listed}", "tetrahedra alone or hexahedra alone, of first order")
+        return np.vstack(blocks)
     if wrong := {block.shape[1] for block in blocks} - {3, 4}:
         raise MisuseError("--mesh", f"cells with {min(wrong)} corners", "triangles or quadrilaterals")
     if len({block.shape[1] for block in blocks}) > 1:
@@ -209,6 +237,9 @@ def _set_supports(sides: MeshSides, parts: list[_Part], supports: Mapping[str, S
         if not any(np.isin(part.numbers, points).any() for part in parts):
             needed = "a group with nodes of the body of slave or master"
             raise MisuseError("--support", f"{name!r}, which has no node of these bodies", needed)
+        if len(displacement) != sides.points.shape[1]:
+            numbers = ",".join(["free" if value is None else f"{value:g}" for value in displacement])
+            raise MisuseError("--support", f"{name}={numbers}", f"{sides.points.shape[1]} numbers, one along each axis")
         for part in parts:
             nodes = np.isin(part.numbers, points)
             part.has_supports |= bool(nodes.any())
@@ -221,16 +252,14 @@ def _set_supports(sides: MeshSides, parts: list[_Part], supports: Mapping[str, S
 
 def _far_nodes(part: _Part) -> IntArray:
     """Return the nodes on the boundary that looks away from the contact; around a ring, on all other boundary."""
-    edges = np.stack([part.cells, np.roll(part.cells, -1, axis=1)], axis=-1).reshape(-1, 2)
-    n_nodes = len(part.nodes)
-    keys, reverse = edges @ [n_nodes, 1], edges @ [1, n_nodes]
-    edges = edges[~np.isin(keys, reverse) & ~np.isin(keys, part.contact @ [n_nodes, 1])]
-    along = np.diff(part.nodes[edges], axis=1)[:, 0]
-    normals = np.column_stack([along[:, 1], -along[:, 0]]) / np.hypot(*along.T)[:, None]
-    far = np.unique(edges[normals @ part.normal < -AWAY] if part.normal.any() else edges)
+    kind = _KINDS[part.nodes.shape[1], part.cells.shape[1]]
+    outer = CellSides.collect({kind: part.cells}, part.nodes).around(part.contact)
+    normals = unit_normals(part.nodes[outer])
+    far = np.unique(outer[normals @ part.normal < -AWAY] if part.normal.any() else outer)
     if not len(far):
         actual = f"none for the {part.side} body, no boundary of which looks away from the contact"
-        raise MisuseError("--support", actual, "--support GROUP=0,0, a group on its boundary")
+        zeros = ",".join("0" * part.nodes.shape[1])
+        raise MisuseError("--support", actual, f"--support GROUP={zeros}, a group on its boundary")
     return far
 
 
@@ -254,11 +283,12 @@ def _scene(parts: list[_Part]) -> Scene:
     arrays = [(part.nodes, part.cells, part.contact, *part.material, part.fixed, part.imposed) for part in parts]
     bodies = tuple(Body(*each, name=f"{part.side} body") for each, part in zip(arrays, parts, strict=True))
     n_slaves = sum(part.side == "slave" for part in parts)
-    elastic = [part for part in parts if len(part.cells)]
+    elastic, dim = [part for part in parts if len(part.cells)], parts[0].nodes.shape[1]
     if not elastic:
-        raise MisuseError("--mesh", "no 2-D cells beside the lines of slave or master", "the cells of a body")
-    segments = [np.diff(part.nodes[part.contact], axis=1)[:, 0] for part in parts[:n_slaves]]
-    length = float(np.hypot(*np.vstack(segments).T).mean())
+        actual = "no 2-D cells beside the lines" if dim == PLANE else "no tetrahedra or hexahedra behind the faces"
+        raise MisuseError("--mesh", f"{actual} of slave or master", "the cells of a body")
+    sizes = [Surface(part.contact).measures(part.nodes) for part in parts[:n_slaves]]
+    length = float(np.concatenate(sizes).mean()) ** (1 / (dim - 1))
     penalty = STIFFNESS * min(part.material[0] for part in elastic) / length
     indices = range(len(bodies))
     return Scene(bodies, tuple(indices[:n_slaves]), tuple(indices[n_slaves:]), penalty)
@@ -267,24 +297,25 @@ def _scene(parts: list[_Part]) -> Scene:
 def parse_material(text: str) -> tuple[str, Material]:
     """Return the group and the material of GROUP=E,ν."""
     needed = "GROUP=E,ν such as base=1000,0.3"
-    name, (young, poisson) = _parse(text, "--material", needed)
+    name, (young, poisson) = _parse(text, "--material", needed, (2,))
     if young is None or poisson is None:
         raise MisuseError("--material", repr(text), needed)
     return name, (young, poisson)
 
 
 def parse_support(text: str) -> tuple[str, Support]:
-    """Return the group and the displacement of GROUP=X,Y, each a number or `free`."""
-    return _parse(text, "--support", "GROUP=X,Y such as base=0,0 or lid=free,-0.1")
+    """Return the group and the displacement of GROUP=X,Y or GROUP=X,Y,Z, each a number or `free`."""
+    needed = "GROUP=X,Y such as base=0,0 or lid=free,-0.1; in space GROUP=X,Y,Z"
+    return _parse(text, "--support", needed, (2, 3))
 
 
-def _parse(text: str, option: str, needed: str) -> tuple[str, Support]:
-    """Return the name and the two numbers of NAME=NUMBER,NUMBER, None for `free`."""
+def _parse(text: str, option: str, needed: str, counts: tuple[int, ...]) -> tuple[str, Support]:
+    """Return the name and the numbers of NAME=NUMBER,NUMBER, as many as `counts` allows, None for `free`."""
     name, _, words = text.rpartition("=")
     try:
         numbers = [None if word.strip() == "free" else float(word) for word in words.split(",")]
     except ValueError:
         numbers = []
-    if not name or len(numbers) != 2 or not all(number is None or isfinite(number) for number in numbers):
+    if not name or len(numbers) not in counts or not all(number is None or isfinite(number) for number in numbers):
         raise MisuseError(option, repr(text), needed)
-    return name, (numbers[0], numbers[1])
+    return name, tuple(numbers)

@@ -204,7 +204,7 @@ class RunOptions:
         Option(
             "Displacement imposed on a group of the mesh, each a number or free. (default: bodies are held far from "
             "the contact, and the slave is pushed) Repeatable.",
-            "GROUP=X,Y",
+            "GROUP=X,Y[,Z]",
             group=PLACE,
         ),
     ] = ()
