@@ -116,7 +116,16 @@ class RunOptions:
             needed="a list of patterns",
         ),
     ] = ()
-    examples: Annotated[int | None, Option("Number of random cases of each property.", "N", group=SAMPLING)] = None
+    examples: Annotated[
+        int | None,
+        Option(
+            "Number of random cases of each property.",
+            "N",
+            group=SAMPLING,
+            setting="examples",
+            needed="a whole number",
+        ),
+    ] = None
     seed: Annotated[int | None, Option("The same seed gives the same cases.", "N", group=SAMPLING)] = None
     profile: Annotated[
         str | None,
@@ -265,7 +274,10 @@ class RunOptions:
         from contactverif.plugins.registry import has_engine, matching_ids, property_ids, unknown_property_error
 
         settings, nothing = read_settings(), RunOptions()
+        # A profile that is typed has its own number of cases, and so has `--quick`.
+        typed = {"examples"} if self.profile or self.quick else set()
         silent = [name for name in _settings().values() if getattr(self, name) == getattr(nothing, name)]
+        silent = [name for name in silent if name not in typed]
         options = replace(self, **{name: getattr(settings, name) for name in silent})
         ids = property_ids(engines=True)
         for unknown in settings.known.keys() - {*ids}:

@@ -103,10 +103,28 @@ def test_the_command_takes_them_and_a_known_failure_is_no_news(ask: Ask) -> None
 
 
 @pytest.mark.parametrize(
+    ("words", "examples"),
+    [
+        ({}, 7),
+        ({"examples": 3}, 3),
+        ({"profile": "nightly"}, 2000),
+        ({"quick": True}, 5),
+        ({"examples": 9, "quick": True}, 9),
+    ],
+)
+def test_the_number_of_cases_is_that_of_the_project_unless_something_else_is_typed(
+    words: dict[str, Any], examples: int
+) -> None:
+    write_table('[tool.contactverif]\nprofile = "ci"\nexamples = 7\n')
+    assert RunOptions(names=("nts",), **words).with_settings().settle().examples == examples
+
+
+@pytest.mark.parametrize(
     ("text", "message"),
     [
         ("[tool.contactverif]\nopen = 3", "open in [tool.contactverif] of pyproject.toml: found 3; needed a list of"),
         ("[tool.contactverif]\njobs = '2'", "jobs in [tool.contactverif] of pyproject.toml: found '2'; needed a whole"),
+        ("[tool.contactverif]\nexamples = '2'", "examples in [tool.contactverif] of pyproject.toml: found '2'; needed"),
         ("[tool.contactverif]\nisolation = 'jail'", "found 'jail'; needed box, landlock, process or inline"),
         ("[tool.contactverif]\nknown = {a = 1}", "found {'a': 1}; needed a table of properties and reasons"),
         ("[tool.contactverif]\ntraits = 1", "found 1; needed a table of libraries and their traits"),

@@ -178,17 +178,28 @@ def prepare(page: Path, folder: Path) -> None:
 
 
 def outputs(page: Path, folder: Path) -> dict[str, subprocess.CompletedProcess[str]]:
-    """Run the commands of a page whose output or picture is shown, and those that write the files they read."""
+    """Run the commands of a page whose output or picture is shown, and those that write what they read.
+
+    A project that a command makes is installed.
+    """
     prepare(page, folder)
     quoted = {quote.command for quote in quotes(page) if not quote.foreign}
     needed: list[str] = []
     for line in reversed(commands(page.read_text(encoding="utf-8"))):
         files = re.findall(r"--out (\S+)", line)
+        files += re.findall(r"^contactverif new (\S+)", line)
         is_read = any(file in later.split() for file in files for later in needed)
         is_shown = line in quoted or re.search(r"--out \S+\.svg", line)
         if line.startswith("contactverif ") and (is_shown or is_read):
             needed.insert(0, line)
-    return {line: call(*shlex.split(line), folder=folder) for line in needed}
+    results = {}
+    for line in needed:
+        results[line] = call(*shlex.split(line), folder=folder)
+        if line.startswith("contactverif new "):
+            project = folder / line.split()[2]
+            install_project(folder / "site", (project / "pyproject.toml").read_text(encoding="utf-8"))
+            shutil.copy(project / f"{project.name.replace('-', '_')}.py", folder / "site")
+    return results
 
 
 def excerpt(output: str, patterns: str) -> str:

@@ -36,14 +36,15 @@ def test_a_new_project_passes_its_tests_and_keeps_its_promises(
     assert enter == ["cd", "mine", "&&", "pip", "install", "-e", "."]
     install_project(project / "site", (project / "pyproject.toml").read_text(encoding="utf-8"))
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join(filter(None, [str(project), os.environ.get("PYTHONPATH")])))
-    tested = call(*tests, "-k", " or ".join(CHOICE), folder=project)
+    choices = (*CHOICE, "patch.flat.solve") if options == ("--3d",) else CHOICE
+    tested = call(*tests, "-k", " or ".join(choices), folder=project)
     assert tested.returncode == 0, tested.stdout + tested.stderr
     n_formulations = 2 if options == ("--jax",) else 1
-    assert re.search(rf"contactverif: {len(CHOICE) * n_formulations} checks", tested.stdout), tested.stdout
-    verified = call(*verify, *(f"-p{choice}" for choice in CHOICE), "--examples", "8", folder=project)
+    assert re.search(rf"contactverif: {len(choices) * n_formulations} checks", tested.stdout), tested.stdout
+    verified = call(*verify, *(f"-p{choice}" for choice in choices), "--examples", "8", folder=project)
     assert verified.returncode == 0, verified.stdout + verified.stderr
     assert verified.stdout.startswith("profile ci: 8 random cases for each property, seed 0\n")
-    assert f"\nmine: {len(CHOICE)} pass\n" in verified.stdout
+    assert f"\nmine: {len(choices)} pass\n" in verified.stdout
     assert "\nEvery promise is kept and every property was judged.\n" in verified.stdout
 
 
@@ -98,11 +99,12 @@ def test_the_tests_of_the_page_pass(tmp_path: Path) -> None:
     assert finished.stdout.splitlines()[-1].startswith("2 passed"), finished.stdout
 
 
-def test_the_counterexample_is_what_the_command_prints(tmp_path: Path) -> None:
-    (quote,) = (quote for quote in quotes(FACES) if quote.kind == "output")
-    finished = outputs(FACES, tmp_path)[quote.command]
-    assert finished.returncode == 0, finished.stderr
-    assert quote.block == excerpt(finished.stdout, quote.argument)
+def test_the_page_about_faces_quotes_what_its_commands_print(tmp_path: Path) -> None:
+    results = outputs(FACES, tmp_path)
+    for quote in quotes(FACES):
+        finished = results[quote.command]
+        assert finished.returncode == 0, finished.stderr
+        assert quote.block == excerpt(finished.stdout, quote.argument)
 
 
 def test_the_quoted_verdicts_are_those_that_its_python_must_print() -> None:
