@@ -17,7 +17,7 @@ from contactverif.plugins.registry import load_formulation
 from contactverif.run.journal import journal_folder, remove_journal
 from contactverif.run.run_options import RunOptions
 from contactverif.studies.bench_cells import run_bench
-from contactverif.studies.bench_plan import BenchPlan, make_plan
+from contactverif.studies.bench_plan import OTHER_DIMENSION, BenchPlan, make_plan
 from contactverif_reports import bench_costs
 from contactverif_reports.bench_results import BenchResults, Outcome
 from contactverif_reports.files import whole
@@ -78,7 +78,8 @@ def bench(
     if pictures is not None:
         echo(f"pictures: {options.pictures}")
     crashed = bool((results.outcomes == Outcome.CRASHED).any())
-    return int(crashed or bool(results.not_loaded) or any(change.worse for change in since))
+    failed = any(not reason.startswith(OTHER_DIMENSION) for reason in results.not_loaded.values())
+    return int(crashed or failed or any(change.worse for change in since))
 
 
 def _run(options: RunOptions, plan: BenchPlan, files: OutputFiles) -> BenchResults:

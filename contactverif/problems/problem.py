@@ -12,6 +12,7 @@ import numpy as np
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case
 from contactverif.contract.errors import MisuseError, describe_error, place_of_error
+from contactverif.contract.interface import PLANE
 from contactverif.contract.property import Quantity
 from contactverif.contract.traits import Traits
 from contactverif.mechanics.accuracy import (
@@ -139,6 +140,7 @@ class Problem:
     targets: tuple[float, ...]  # The errors of forces that cost is measured at, from large to small
     pose: Callable[[int, float, Traits, Variation], ProblemInstance]
     rank: int = 100  # Pages show problems of lower rank first.
+    dim: int = PLANE  # 3 in space, where the faces are triangles
 
 
 class Study(Protocol):

@@ -19,7 +19,7 @@ from contactverif.contract.property import Outcome, Property, PropertyInfo, Verd
 from contactverif.contract.result import JUDGED_SHARE, OPPOSITE_SIGN, NodalForces, Row, exceeds
 from contactverif.contract.subject import EngineSubject, FirstAnswers, Subject, ask_first
 from contactverif.contract.traits import Traits
-from contactverif.problems.blocks import at_exact_solution
+from contactverif.problems.blocks import at_exact_solution, is_uniform
 from contactverif.problems.named_states import first_state, flat_in_space, named_case
 from contactverif.problems.open_states import fit_to_traits
 from contactverif.problems.own_law import fit_to_law, is_nonlinear
@@ -156,12 +156,14 @@ def forces_on(case: Case, subject: Subject) -> FloatArray | None:
 def forces_to_draw(question: Property, case: Case, subject: Subject) -> NodalForces | None:
     """Return the forces of a formulation on a case, beside the exact ones where the property knows them.
 
-    Those of bodies are at the exact solution where it is known, else at the first guess.
+    Those of bodies are at the exact solution where it is uniform, else at the first guess and without exact ones.
     """
     forces = forces_on(at_exact_solution(case), subject)
     if forces is None:
         return None
-    return NodalForces(forces, None if question.exact is None else question.exact(case))
+    if question.exact is None or (case.packed_bodies and not is_uniform(case)):
+        return NodalForces(forces)
+    return NodalForces(forces, question.exact(case))
 
 
 @dataclass(frozen=True, slots=True)

@@ -38,7 +38,7 @@ from contactverif.mechanics.system import System
 from contactverif.plugins.provenance import collect_provenance
 from contactverif.problems.problem import ProblemInstance
 from contactverif.run import journal
-from contactverif.studies.bench_plan import BenchPlan, is_solved, largest_errors, pose
+from contactverif.studies.bench_plan import BenchPlan, is_solved, largest_errors, match_dimension, pose
 from contactverif_reports.bench_results import COUNTS, ERRORS, RULE, VARIANTS, BenchResults, Cell, Outcome
 
 TURNS = 5  # The number of timed evaluations in each process, and the largest of timed factorisations.
@@ -344,6 +344,8 @@ def run_bench(
     loaded = [subject for subject in subjects if isinstance(subject, Subject)]
     if not loaded:
         raise MisuseError("NAME", "no formulation that loads", "at least one")
+    plan, others = match_dimension(plan, loaded)
+    loaded = [subject for subject in loaded if subject.name not in others]
     provenance = collect_provenance(profile="", examples=0, seed=plan.seed)
     del provenance["profile"], provenance["examples"]  # A bench has neither.
     provenance |= places(loaded)
@@ -357,7 +359,7 @@ def run_bench(
     if not cells:
         raise MisuseError("--scene", "; ".join(map(": ".join, failures.items())), "a problem that can be posed")
     not_loaded = {item.formulation: item.reason for item in subjects if isinstance(item, NotLoaded)} | plan.not_loaded
-    return _collect_results(names, replace(plan, cells=cells), records, not_loaded | failures, provenance)
+    return _collect_results(names, replace(plan, cells=cells), records, not_loaded | failures | others, provenance)
 
 
 def _run_cells(

@@ -5,7 +5,7 @@ give equal results but for seconds.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache
 from itertools import product
 from typing import Any
@@ -14,7 +14,9 @@ from zlib import crc32
 import numpy as np
 
 from contactverif.contract.errors import MisuseError, describe_error, place_of_error
+from contactverif.contract.interface import PLANE, SPACE, TRIANGLE
 from contactverif.contract.result import NotLoaded
+from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
 from contactverif.mechanics.accuracy import Solution
 from contactverif.plugins.registry import load_problems
@@ -25,6 +27,7 @@ INSTANCES, PROCESSES = 15, 5  # Instances of each mesh, and processes of each fo
 QUICK_MESHES, QUICK_INSTANCES, QUICK_PROCESSES = 2, 5, 2
 MOST = 1000  # Instances or processes
 NEARLY_BALANCED = 1e-4  # An iterate that is out of balance by this share of the largest force is a solution.
+OTHER_DIMENSION = "another dimension"  # Begins the reason of what is left out, which is no failure.
 _SIZE, _LOAD = 0.2, 0.2  # The largest changes of size and load
 
 
@@ -70,6 +73,34 @@ def make_plan(
     if not cells:
         raise MisuseError("--scene", "; ".join(map(": ".join, not_loaded.items())), "a problem that loads")
     return BenchPlan(tuple(cells), n_processes, not_loaded=not_loaded)
+
+
+def match_dimension(plan: BenchPlan, subjects: Sequence[Subject]) -> tuple[BenchPlan, dict[str, str]]:
+    """Return the plan of problems in the plane or in space alone, and {name: why it is left out}.
+
+    Where the plan has both, the first formulation decides.
+    """
+    problems = plan.problems
+    dims = {problem.dim for problem in problems.values()}
+    if len(dims) > 1:
+        dims &= {PLANE if PLANE in subjects[0].traits.abilities.dimensions else SPACE}
+    dim = min(dims)
+    place, needed = ("in the plane", "segments") if dim == PLANE else ("in space", "triangles")
+    others = {
+        name: f"{OTHER_DIMENSION}: it is {'in space' if dim == PLANE else 'in the plane'}, the bench {place}"
+        for name, problem in problems.items()
+        if problem.dim != dim
+    }
+    for subject in subjects:
+        abilities = subject.traits.abilities
+        if dim not in abilities.dimensions or (dim == SPACE and TRIANGLE not in abilities.faces):
+            others[subject.name] = f"{OTHER_DIMENSION}: it takes no {needed} {place}"
+    if all(subject.name in others for subject in subjects):
+        listed = "; ".join(f"{subject.name}: {others[subject.name]}" for subject in subjects)
+        raise MisuseError(
+            "NAME", listed, f"a formulation for {', '.join(name for name in problems if name not in others)}"
+        )
+    return replace(plan, cells=tuple(cell for cell in plan.cells if cell.scene not in others)), others
 
 
 def vary(cell: Cell, seed: int) -> Variation:

@@ -26,6 +26,7 @@ from subjects import Changed, alone, load_subject
 from contactverif import MisuseError, Subject, Traits
 from contactverif.contract.arrays import dense
 from contactverif.contract.errors import PluginError
+from contactverif.contract.interface import PLANE
 from contactverif.contract.result import NotLoaded
 from contactverif.isolation import remote
 from contactverif.isolation.host import answer_of
@@ -38,6 +39,7 @@ from contactverif.mechanics.system import System
 from contactverif.plugins import registry
 from contactverif.plugins.registry import load_formulation, load_problems
 from contactverif.problems.problem import FORCES, MOTIONS, PRESSURE, Problem, ProblemInstance, Variation
+from contactverif.problems.space_problems import EGG_BOX, HERTZ_IN_SPACE
 from contactverif.run.journal import RecordFile, journal_folder, read_messages, record_files
 from contactverif.studies import bench_plan
 from contactverif.studies.bench_cells import (
@@ -51,11 +53,13 @@ from contactverif.studies.bench_cells import (
 )
 from contactverif.studies.bench_plan import BenchPlan, largest_errors, make_plan, pose, vary
 from contactverif_mortar import segment_to_segment
+from contactverif_reports import bench_costs
 from contactverif_reports.bench_results import COUNTS, RULE, VARIANTS, Cell, Outcome
 from contactverif_reports.netcdf.bench_file import read_bench, write_bench
 
 WAVY = Cell("wavy", 8, 0)
 PROBLEMS = {name: problem for name, problem in load_problems().items() if isinstance(problem, Problem)}
+IN_PLANE = [name for name, problem in PROBLEMS.items() if problem.dim == PLANE]
 ARGUMENTS = ["bench", "nts-ar", "vts-ppt", "--scene", "kinked", "--instances", "2", "--processes", "2"]
 VARIATIONS = [Variation(), *(vary(Cell("any", 1, number), 0) for number in range(2))]
 
@@ -66,7 +70,7 @@ def solve_cell(cell: Cell, subject: Subject) -> list[SolutionRecord]:
 
 
 @pytest.mark.parametrize("variation", VARIATIONS, ids=["mesh itself", *"01"])
-@pytest.mark.parametrize("scene", PROBLEMS)
+@pytest.mark.parametrize("scene", IN_PLANE)
 def test_errors_are_small_from_both_starts_and_fall_on_a_finer_mesh(scene: str, variation: Variation) -> None:
     """On the zigzag the exact solution is in the space of the meshes, so that only roundoff is left."""
     subject, problem = load_subject("vts-ppt"), PROBLEMS[scene]
@@ -85,7 +89,7 @@ def test_errors_are_small_from_both_starts_and_fall_on_a_finer_mesh(scene: str, 
     assert errors[-1][0] < 0.9 * errors[0][0] or errors[0][0] < 1e-5
 
 
-@pytest.mark.parametrize("scene", PROBLEMS)
+@pytest.mark.parametrize("scene", IN_PLANE)
 def test_a_deep_start_is_ten_times_as_deep_and_no_start_is_the_solution(scene: str) -> None:
     subject, problem = load_subject("sts"), PROBLEMS[scene]
     instance = problem.pose(problem.meshes[0], 10.0, subject.traits, Variation())
@@ -351,6 +355,33 @@ def test_a_strangers_problem_is_one_more_scene(monkeypatch: pytest.MonkeyPatch, 
     assert facts == (results.cells, "a stranger's zigzag", {"zigzag": stranger.targets})
     with pytest.raises(MisuseError, match="--scene: found number: the entry point gives a int"):
         make_plan(["number"])
+
+
+@pytest.mark.parametrize(("problem", "meshes"), [(EGG_BOX, (1, 2)), (HERTZ_IN_SPACE, (3, 5))], ids=["egg-box", "hertz"])
+def test_errors_in_space_are_small_and_fall_on_a_finer_mesh(problem: Problem, meshes: tuple[int, int]) -> None:
+    subject, errors = load_subject("sts-3d"), []
+    for mesh in meshes:
+        instance = problem.pose(mesh, 10.0, subject.traits, Variation(load=1.1, swapped=True))
+        errors.append(instance.errors(solve_for_accuracy(instance.scene, subject, instance.start, instance.step)))
+    assert max(errors[1][kind] for kind in FORCES) < problem.targets[0]
+    assert all(errors[1][kind] < 0.85 * errors[0][kind] for kind in (*FORCES, PRESSURE))
+
+
+def test_a_bench_is_in_the_plane_or_in_space_and_says_who_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    install_problems(monkeypatch, eggs=replace(EGG_BOX, meshes=(1,)), zigzag=replace(PROBLEMS["kinked"], meshes=(1,)))
+    plan = make_plan(["eggs", "zigzag"], instances=1, processes=1)
+    faces, segments = load_subject("sts-3d"), load_subject("sts")
+    results = run_bench([faces, segments], plan)
+    assert (results.formulations, results.scenes) == (("sts-3d",), ("eggs",))
+    assert results.not_loaded == {
+        "zigzag": "another dimension: it is in the plane, the bench in space",
+        "sts": "another dimension: it takes no triangles in space",
+    }
+    cost = bench_costs.cost_of(results, "sts-3d", "eggs", EGG_BOX.targets[0])
+    assert all(np.isfinite(cost.middle(number)) for number in ("evaluation", "systems", "factorisation", "factors"))
+    assert run_bench([segments, faces], plan).scenes == ("zigzag",)
+    with pytest.raises(MisuseError, match=r"^NAME: found sts: .*no triangles in space; needed a formulation for eggs"):
+        run_bench([segments], make_plan(["eggs"], instances=1, processes=1))
 
 
 def _fail(mesh: int, penalty: float, traits: Traits, variation: Variation) -> ProblemInstance:
