@@ -80,19 +80,22 @@ def _label_plainly(*every: Any) -> None:
 
 @matplotlib.rc_context(_STYLE)
 def make_scene_figure(results: BenchResults, scene: str) -> Figure:
-    """Return the three errors of a scene, each against one evaluation and against one factorisation."""
-    pens = highlights(results)
-    figure, panels = _panels((_WIDTH, 6.8), len(ERRORS), len(_AXES), sharex="col", sharey="row")
-    for row, kind in zip(panels, ERRORS, strict=True):
+    """Return the errors of a scene that are known, each against one evaluation and against one factorisation."""
+    pens, errors = highlights(results), results.errors[:, results.ladders(scene).reshape(-1)]
+    kinds = [kind for place, kind in enumerate(ERRORS) if np.isfinite(errors[..., place]).any()] or list(ERRORS)
+    figure, panels = _panels((_WIDTH, 0.5 + 2.1 * len(kinds)), len(kinds), len(_AXES), sharex="col", sharey="row")
+    for row, kind in zip(panels, kinds, strict=True):
         for axes, number in zip(row, _AXES, strict=True):
             axes.set(xscale="log", yscale="log")
             for name in sorted(results.formulations, key=lambda name: name in pens):
                 _plot_curve(axes, results, scene, (name, kind, number), pens.get(name, _GREY))
         row[0].set_ylabel(f"error of the {kind}")
     best = np.median(results.best_pressure[results.ladders(scene)], axis=0)
-    if REFERENCE in results.formulations and (best > bench_costs.ROUNDOFF).all():  # Uniform pressures have no error.
+    if (
+        "pressure" in kinds and REFERENCE in results.formulations and (best > bench_costs.ROUNDOFF).all()
+    ):  # Uniform pressures have no error.
         # What the mesh allows pressures, at the times of the reference.
-        for axes, number in zip(panels[list(ERRORS).index("pressure")], _AXES, strict=True):
+        for axes, number in zip(panels[kinds.index("pressure")], _AXES, strict=True):
             x, _ = bench_costs.curve(results, REFERENCE, scene, "pressure", number)
             axes.plot(1e3 * x, best, **_DOTTED)
     for axes, label in zip(panels[-1], _AXES.values(), strict=True):
