@@ -225,7 +225,7 @@ def view_face(
 @compile_part
 def measure_distance(point: FloatArray) -> float:
     """Return the largest coordinate of a point (3,)."""
-    return max(abs(point[0]), abs(point[1]), abs(point[2]))
+    return float(max(abs(point[0]), abs(point[1]), abs(point[2])))
 
 
 @compile_part
