@@ -31,7 +31,7 @@ complex in the residual.
 """
 
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from scipy import sparse
@@ -526,7 +526,7 @@ def _arrays_of(interface: Interface, pairing: Pairing) -> tuple[Fields, int]:
 
 
 def vts_ppt_3d(
-    *, penalty: float, normal: Literal["master", "slave"] = "master", tau: float = 1e-2
+    *, penalty: float, normal: str = "master", tau: float = 1e-2
 ) -> FacePatches | FaceQuarters:
     """VTS-PPT on faces: virtual slave nodes in four parts of each face, pressing on all master faces under their parts.
 
