@@ -9,7 +9,6 @@ from typing import Any
 from rich.text import Text
 
 from contactverif.cli.console import columns, line, show
-from contactverif.contract.case import NO_CASES
 from contactverif.contract.result import NotLoaded
 from contactverif.contract.subject import ENGINE, OPTIONAL_PARTS, Subject
 from contactverif.contract.traits import Evidence, Traits
@@ -46,7 +45,7 @@ def list_installed(options: RunOptions, traits: bool) -> None:
     questions = (
         (item.formulation, "", _not_loaded(item))
         if isinstance(item, NotLoaded)
-        else (item.id, "3-D" if item.cases == NO_CASES else "2-D, 3-D" if item.cases_in_space else "2-D", item.summary)
+        else (item.id, "2-D" if item.cases_in_space is None else "2-D, 3-D", item.summary)
         for item in load_properties()
     )
     _show_table("properties", ("id", "in", "asks"), questions)

@@ -317,9 +317,6 @@ class Cases:
         return None if self.on_place is None else self.on_place(place)
 
 
-NO_CASES = Cases.from_list(tuple)  # Those in the plane of a property that is about bodies in space alone.
-
-
 def random_source(name: str, needs: str = "") -> Callable[[_Function], _Function]:
     """Return a decorator that stores a name, which no other function has, at a function that makes cases.
 

@@ -18,7 +18,7 @@ from sys import modules
 from typing import Annotated, Any, Literal, overload
 
 from contactverif.contract.arrays import FloatArray
-from contactverif.contract.case import NO_CASES, Case, Cases, CaseSummary
+from contactverif.contract.case import Case, Cases, CaseSummary
 from contactverif.contract.errors import MisuseError, clean, refuse
 from contactverif.contract.interface import TRIANGLE
 from contactverif.contract.subject import SOLVE, TOO_DEEP, EngineSubject, Subject
@@ -275,7 +275,7 @@ class Property(PropertyInfo):
     Attributes
     ----------
     cases : Callable[[Any], Any]
-        The cases in the plane, a `Cases`; `NO_CASES` if the question is about bodies in space alone.
+        The cases in the plane, a `Cases`.
     cases_in_space : Cases | None
         The cases on interfaces in space, with a stored name of their own; None if the question is about plane
         interfaces alone. They are on triangles, unless the function that makes them has an argument `faces`.
@@ -380,8 +380,6 @@ class Property(PropertyInfo):
     def refusal(self, traits: Traits) -> str:
         """Return why the property is not asked of a formulation of these traits, or an empty string."""
         enforcement = traits.rules.enforcement
-        if traits.abilities.in_plane and self.cases == NO_CASES:
-            return "the bodies are in space, and the formulation is asked in the plane"
         if not traits.abilities.in_plane:
             if self.cases_in_space is None:
                 return "the interfaces are plane, and the formulation takes none of them"

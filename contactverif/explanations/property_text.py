@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF
-from contactverif.contract.case import NO_CASES, Case
+from contactverif.contract.case import Case
 from contactverif.contract.counterexample import Counterexample
 from contactverif.contract.property import CheckedNumber, Property, Quantity, checked_numbers
 from contactverif.contract.subject import Subject
@@ -111,10 +111,9 @@ def property_text(question: Property) -> str:
     cases = "elastic bodies, solved by Newton's method" if question.bodies else "an interface alone; nothing is solved"
     needs = ", ".join(f"`{part}`" for part in sorted(question.needs)) or "`residual` only"
     in_space = ", and in space, where a segment is a face" if question.cases_in_space else ""
-    place = f"in the plane{in_space}" if question.cases != NO_CASES else "in space"
     facts = [
         ("Cases", cases),
-        ("Dimensions", place),
+        ("Dimensions", f"in the plane{in_space}"),
         ("Parts of the plugin that it needs", needs),
         ("Promised by", promised_by(question)),
         *([("Not asked of a law of its own", question.linear)] if question.linear else []),

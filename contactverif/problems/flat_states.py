@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cache, partial, wraps
 from itertools import accumulate, cycle, pairwise, product
-from math import cos, radians, sin
+from math import cos, ldexp, radians, sin
 from operator import mul
 
 import numpy as np
@@ -414,6 +414,46 @@ def rotation(quaternion: Quaternion) -> tuple[list[list[int]], int]:
         [2 * (b * d - a * c), 2 * (c * d + a * b), a * a - b * b - c * c + d * d],
     ]
     return rows, a * a + b * b + c * c + d * d
+
+
+@dataclass(frozen=True, slots=True)
+class SpaceMotion:
+    """A similarity x → 2^k (Q x + shift). The rotation Q is that of a quaternion of integers.
+
+    A whole one leaves Q undivided, a matrix of integers that stretches too: so it rounds no point of a lattice.
+    """
+
+    quaternion: tuple[int, int, int, int] = (1, 0, 0, 0)
+    shift: tuple[int, int, int] = (0, 0, 0)  # In units of the lattice.
+    exponent: int = 0
+    whole: bool = False
+
+    @property
+    def scale(self) -> float:
+        """The factor of all lengths: 2^k, or an integer × 2^k."""
+        return ldexp(float(rotation(self.quaternion)[1] if self.whole else 1), self.exponent)
+
+    @property
+    def axes(self) -> FloatArray:
+        """The unit vectors (3, 3) that the axes become, as rows."""
+        rows, size = rotation(self.quaternion)
+        axes: FloatArray = np.array(rows).T / size
+        return axes
+
+    @property
+    def normal(self) -> FloatArray:
+        """The unit vector (3,) that the z-axis becomes."""
+        return np.asarray(self.axes[2])
+
+    def __call__(self, points: FloatArray) -> FloatArray:
+        """Return the points (n, 3), moved; each coordinate is rounded once, from extended precision."""
+        rows, size = rotation(self.quaternion)
+        turned = points.astype(np.longdouble) @ np.array(rows, dtype=np.longdouble).T
+        moved = turned / np.longdouble(1 if self.whole else size) + np.array(self.shift, dtype=np.longdouble)
+        return (moved * ldexp(1.0, self.exponent)).astype(np.float64)
+
+
+AT_REST = SpaceMotion()
 
 
 def flat_face_state(

@@ -6,8 +6,6 @@ beside the slave, and the other way round.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from math import ldexp
 
 import numpy as np
 
@@ -16,44 +14,7 @@ from contactverif.contract.body import Body
 from contactverif.contract.interface import TRIANGLE, Interface, Surface
 from contactverif.mechanics.scene import Scene
 from contactverif.oracle.flat_answers import uniform_surface_weights
-from contactverif.problems.flat_states import rotation
-
-
-@dataclass(frozen=True, slots=True)
-class SpaceMotion:
-    """A similarity x → 2^k (Q x + shift). The rotation Q is that of a quaternion of integers.
-
-    A whole one leaves Q undivided, a matrix of integers that stretches too: so it rounds no point of a lattice.
-    """
-
-    quaternion: tuple[int, int, int, int] = (1, 0, 0, 0)
-    shift: tuple[int, int, int] = (0, 0, 0)  # In units of the lattice.
-    exponent: int = 0
-    whole: bool = False
-
-    @property
-    def scale(self) -> float:
-        """The factor of all lengths: 2^k, or an integer × 2^k."""
-        return ldexp(float(rotation(self.quaternion)[1] if self.whole else 1), self.exponent)
-
-    @property
-    def axes(self) -> FloatArray:
-        """The unit vectors (3, 3) that the axes become, as rows."""
-        rows, size = rotation(self.quaternion)
-        axes: FloatArray = np.array(rows).T / size
-        return axes
-
-    @property
-    def normal(self) -> FloatArray:
-        """The unit vector (3,) that the z-axis becomes."""
-        return np.asarray(self.axes[2])
-
-    def __call__(self, points: FloatArray) -> FloatArray:
-        """Return the points (n, 3), moved; each coordinate is rounded once, from extended precision."""
-        rows, size = rotation(self.quaternion)
-        turned = points.astype(np.longdouble) @ np.array(rows, dtype=np.longdouble).T
-        moved = turned / np.longdouble(1 if self.whole else size) + np.array(self.shift, dtype=np.longdouble)
-        return (moved * ldexp(1.0, self.exponent)).astype(np.float64)
+from contactverif.problems.flat_states import AT_REST, SpaceMotion
 
 
 def extrude(faces: IntArray, n_nodes: int, n_layers: int) -> IntArray:
@@ -88,7 +49,7 @@ def space_blocks(
     tilt: tuple[float, float] = (0.0, 0.0),
     rigid_master: bool = False,
     lowered: float | None = None,
-    motion: SpaceMotion = SpaceMotion(),
+    motion: SpaceMotion = AT_REST,
 ) -> Scene:
     """Return the scene of a slave block that is pressed down on a master block, or on a rigid floor.
 

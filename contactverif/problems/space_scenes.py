@@ -15,8 +15,8 @@ from contactverif.contract.case import Case
 from contactverif.contract.interface import Interface
 from contactverif.mechanics.scene import Scene
 from contactverif.problems.catalogue import MODERATE_PENALTY
-from contactverif.problems.flat_states import collect_on_faces
-from contactverif.problems.space_blocks import SpaceMotion, rectangle, space_blocks
+from contactverif.problems.flat_states import SpaceMotion, collect_on_faces
+from contactverif.problems.space_blocks import rectangle, space_blocks
 
 Lines = Sequence[float]
 SIDE, _STRAIN = 12.0, 2.0**-6  # The side of a square, and the pressure over the softer body's E.

@@ -14,7 +14,8 @@ from contactverif.contract.interface import TRIANGLE, Interface
 from contactverif.mechanics.scene import Scene, has_bodies
 from contactverif.problems.blocks import is_uniform
 from contactverif.problems.catalogue import MODERATE_PENALTY
-from contactverif.problems.space_blocks import SpaceMotion, space_blocks
+from contactverif.problems.flat_states import SpaceMotion
+from contactverif.problems.space_blocks import space_blocks
 from contactverif.strategies import samples, solids
 from contactverif.strategies.surfaces import SurfacePair, matched_pairs, space_motions, surface_grids, surface_pairs
 

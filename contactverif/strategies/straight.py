@@ -18,7 +18,7 @@ from hypothesis.strategies import DrawFn, SearchStrategy
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case, random_source
 from contactverif.contract.interface import TRIANGLE, Interface, Surface
-from contactverif.problems.space_blocks import SpaceMotion
+from contactverif.problems.flat_states import SpaceMotion
 from contactverif.strategies import samples
 from contactverif.strategies.surfaces import surface_grids, surface_pairs
 

@@ -525,9 +525,7 @@ def _arrays_of(interface: Interface, pairing: Pairing) -> tuple[Fields, int]:
     return (*arrays, members[: starts[-1]], starts), size
 
 
-def vts_ppt_3d(
-    *, penalty: float, normal: str = "master", tau: float = 1e-2
-) -> FacePatches | FaceQuarters:
+def vts_ppt_3d(*, penalty: float, normal: str = "master", tau: float = 1e-2) -> FacePatches | FaceQuarters:
     """VTS-PPT on faces: virtual slave nodes in four parts of each face, pressing on all master faces under their parts.
 
     Gaps, forces and projections are along the normal of the nearest master face, as the paper has it in the plane. It

@@ -106,7 +106,7 @@ def test_an_engine_is_asked_in_the_dimensions_that_it_takes() -> None:
         ("patch.flat.solve", slice(6)),
         ("patch.variants", slice(8)),
         ("patch.curved", slice(2)),
-        ("accuracy.egg-box", slice(2, 3)),
+        ("accuracy.wavy", slice(2, 3)),
         ("accuracy.hertz", slice(1)),
         ("hard.contrast", slice(0, None, 7)),
         ("hard.dead-zone", slice(1, None, 5)),

@@ -16,7 +16,8 @@ from contactverif.mechanics.bulk import assemble_stiffness, condense, loose_mode
 from contactverif.mechanics.changed_scenes import change_units
 from contactverif.mechanics.scene import Scene, scene_of
 from contactverif.oracle.flat_answers import uniform_surface_weights
-from contactverif.problems.space_blocks import SpaceMotion, extrude, rectangle, space_blocks
+from contactverif.problems.flat_states import SpaceMotion
+from contactverif.problems.space_blocks import extrude, rectangle, space_blocks
 from contactverif.problems.space_problems import SHELLS
 from contactverif.problems.space_scenes import contrast_space_scenes
 

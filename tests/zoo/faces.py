@@ -555,7 +555,7 @@ for _row in (
     ("no change of the gap, to the end", "newton.history", _in_tangent(_frozen("gap"))),
     ("absolute guard in a step", "newton.units", change_all(_guard)),
     ("areas that shrink where faces are inclined", "patch.curved", change_all(_project)),
-    ("twice the pressure on quadrilaterals", "accuracy.egg-box", change_all(_twice_on_quadrilaterals, converges=True)),
+    ("twice the pressure on quadrilaterals", "accuracy.wavy", change_all(_twice_on_quadrilaterals, converges=True)),
     ("penetration of a point contact capped", "accuracy.hertz", change_all(_cap, converges=True)),
 ):  # fmt: skip
     add(*_row)

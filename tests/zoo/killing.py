@@ -11,7 +11,6 @@ from typing import Any
 from subjects import Changed, load_property
 
 from contactverif import Case, Property, Subject, Verdict, judge_case, load_properties
-from contactverif.contract.case import NO_CASES
 from contactverif.sampling.draw import Sampling, draw_cases
 from zoo.making import PLANE, SPACE, SURVIVORS, Make, Mutant
 from zoo.mutants import faces
@@ -49,9 +48,9 @@ RIGHT_WITHOUT = {
 
 @cache
 def properties(in_space: bool = False) -> dict[str, Property]:
-    """Return {id: property} of the installed properties with cases in the plane, or of those with cases in space."""
+    """Return {id: property} of all installed properties, or of those with cases in space."""
     loaded = [prop for prop in load_properties() if isinstance(prop, Property)]
-    return {prop.id: prop for prop in loaded if (prop.cases_in_space if in_space else prop.cases != NO_CASES)}
+    return {prop.id: prop for prop in loaded if not in_space or prop.cases_in_space is not None}
 
 
 @cache
