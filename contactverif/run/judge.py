@@ -19,7 +19,6 @@ from contactverif.contract.property import Outcome, Property, PropertyInfo, Verd
 from contactverif.contract.result import JUDGED_SHARE, OPPOSITE_SIGN, NodalForces, Row, exceeds
 from contactverif.contract.subject import EngineSubject, FirstAnswers, Subject, ask_first
 from contactverif.contract.traits import Traits
-from contactverif.problems.blocks import at_exact_solution, is_uniform
 from contactverif.problems.named_states import first_state, flat_in_space, named_case
 from contactverif.problems.open_states import fit_to_traits
 from contactverif.problems.own_law import fit_to_law, is_nonlinear
@@ -158,10 +157,15 @@ def forces_to_draw(question: Property, case: Case, subject: Subject) -> NodalFor
 
     Those of bodies are at the exact solution where it is uniform, else at the first guess and without exact ones.
     """
-    forces = forces_on(at_exact_solution(case), subject)
+    uniform = not case.packed_bodies
+    if case.packed_bodies:
+        from contactverif.problems.blocks import at_exact_solution, is_uniform  # Mechanics take long to import.
+
+        case, uniform = at_exact_solution(case), is_uniform(case)
+    forces = forces_on(case, subject)
     if forces is None:
         return None
-    if question.exact is None or (case.packed_bodies and not is_uniform(case)):
+    if question.exact is None or not uniform:
         return NodalForces(forces)
     return NodalForces(forces, question.exact(case))
 

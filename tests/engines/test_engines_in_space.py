@@ -95,7 +95,7 @@ def test_an_engine_is_asked_in_the_dimensions_that_it_takes() -> None:
     flat, both = (EngineSubject("engine/x", Control(dim=2)), EngineTraits("penalty", dimensions=(2, 3)))
     assert question.for_traits(flat.traits) is question
     assert both.dimensions == (2, 3)
-    assert "interfaces are plane" in load_question("accuracy.wavy").refusal_of(CONTROL)
+    assert "interfaces are plane" in load_question("accuracy.wavy-curved").refusal_of(CONTROL)
     with pytest.raises(ValueError, match="dimensions: found"):
         EngineTraits("penalty", dimensions=(4,))
 
