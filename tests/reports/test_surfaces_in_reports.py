@@ -145,7 +145,7 @@ def test_the_page_lists_properties_that_do_not_apply_by_their_reason() -> None:
     properties = [load_property(id_) for id_ in ("balance.force", "hard.c", "accuracy.wavy-curved")]
     page = report_page(run([load_subject("nts-3d")], properties, examples=1, seed=1), "report.nc")
     assert "2 properties do not apply</summary>" in page
-    assert "the interfaces are plane, and the formulation takes none of them: hard.c, accuracy.wavy</li>" in page
+    assert "the interfaces are plane, and the formulation takes none of them: hard.c, accuracy.wavy-curved</li>" in page
     assert "1 pass, 2 not applicable" in page
     assert "<dt" in page[page.index("The properties") :]
     assert "Case C" not in page
