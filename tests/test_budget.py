@@ -44,8 +44,8 @@ FOLDERS = {
 # {package: what it may weigh}
 BUDGET = {
     "contract": Weight(14, 5159, 2942),
-    "mechanics": Weight(20, 4393, 2943),
-    "cases": Weight(48, 10441, 6832),
+    "mechanics": Weight(20, 4394, 2944),
+    "cases": Weight(48, 10438, 6831),
     "properties": Weight(21, 9670, 5879),
     "run": Weight(19, 4205, 3033),
     "isolation": Weight(14, 2852, 2014),
@@ -57,7 +57,7 @@ BUDGET = {
     "foreign": Weight(20, 3013, 2115),
     "paper": Weight(13, 3203, 2448),
 }
-SUM = Weight(272, 64900, 43942)
+SUM = Weight(272, 64898, 43942)
 TESTS = 51088  # Lines of tests and evidence.
 COMMANDS = 14
 WORDS = 40000  # Words of Markdown, without the changelog and the stored results under reports/.

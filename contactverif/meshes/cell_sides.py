@@ -11,6 +11,7 @@ from scipy import sparse
 from scipy.sparse import csgraph
 
 from contactverif.contract.arrays import FloatArray, IntArray
+from contactverif.contract.body import SIDES
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.interface import ONE_SIDED, SEGMENT, Interface, Surface, turns_of, unit_normals
 from contactverif.meshes.plain_mesh import CORNERS, Group
@@ -104,10 +105,10 @@ def _ways(origin: FloatArray, direction: FloatArray, corners: FloatArray) -> Flo
 
 # {kind: the corners of its faces}; which way round is found by the middle of the cell.
 _FACES = {
-    "tetra": ((0, 1, 2), (0, 1, 3), (1, 2, 3), (0, 2, 3)),
+    "tetra": SIDES[4],
     "pyramid": ((0, 1, 2, 3), (0, 1, 4), (1, 2, 4), (2, 3, 4), (3, 0, 4)),
     "wedge": ((0, 1, 2), (3, 4, 5), (0, 1, 4, 3), (1, 2, 5, 4), (2, 0, 3, 5)),
-    "hexahedron": ((0, 1, 2, 3), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7)),
+    "hexahedron": SIDES[8],
 }
 _PLANE = ("triangle", "quad", "polygon")
 

@@ -12,6 +12,7 @@ import numpy as np
 from contactverif.contract.arrays import BoolArray, FloatArray, IntArray
 from contactverif.contract.body import Body
 from contactverif.contract.interface import TRIANGLE, Interface, Surface
+from contactverif.mechanics.bodies import grid_cells
 from contactverif.mechanics.scene import Scene
 from contactverif.oracle.flat_answers import uniform_surface_weights
 from contactverif.problems.flat_states import AT_REST, SpaceMotion
@@ -144,7 +145,7 @@ def rectangle(x: FloatArray, y: FloatArray, corners: int) -> tuple[FloatArray, I
     """Return the points (n, 2) of a grid and its faces, counter-clockwise in the plane."""
     points = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2)
     number = np.arange(len(points)).reshape(len(x), len(y))
-    faces = np.stack([number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]], axis=-1).reshape(-1, 4)
+    faces = grid_cells(number.T)
     return points, np.vstack([faces[:, :3], faces[:, [0, 2, 3]]]) if corners == TRIANGLE else faces
 
 

@@ -27,10 +27,6 @@ from contactverif.problems.problem import Problem, ProblemInstance, Variation
 from contactverif.problems.space_blocks import extrude, rectangle, space_blocks
 
 
-def _oedometric_modulus(young: float, poisson: float) -> float:
-    return young * (1 - poisson) / ((1 + poisson) * (1 - 2 * poisson))
-
-
 @dataclass(frozen=True, slots=True)
 class Shells:
     """An octant of two thick spherical shells, the outer one too small for the inner one. First entries are the inner.
@@ -211,7 +207,7 @@ def _egg_box(box: EggBox, refine: int, penalty: float) -> Scene:
     nodes[0][:, 2] = -box.wave * box.cosines(nodes[0])
     interface = Interface.from_faces(nodes[0], below[:, ::-1], nodes[1], above)
     mean = box.load * box.amplitude(penalty)
-    moduli = map(_oedometric_modulus, box.young, box.poisson)
+    moduli = (e * (1 - v) / ((1 + v) * (1 - 2 * v)) for e, v in zip(box.young, box.poisson, strict=True))
     approach = mean * (1 / penalty + sum(h / m for h, m in zip(box.heights, moduli, strict=True)))
     corners = np.array([[0.0, 0.0], [box.sides[0], 0.0], box.sides, [0.0, box.sides[1]]])
     layers = tuple([height / (4 * refine)] * (4 * refine) for height in box.heights)
