@@ -6,11 +6,12 @@ Sources: Lamé's hollow sphere and the half-space of Boussinesq: Timoshenko & Go
 (1970), Articles 136 and 138; waves and Hertz: K. L. Johnson, Contact Mechanics (1985), Chapters 3, 4 and 13.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cache, partial
 from itertools import product
 from math import hypot, inf, pi, sinh
+from typing import NamedTuple
 
 import numpy as np
 
@@ -133,6 +134,19 @@ def shell_cases() -> tuple[Case, ...]:
     return tuple(SHELLS.scene(inner_slave=inner_slave).case() for inner_slave in (True, False))
 
 
+class EggMesh(NamedTuple):
+    """The meshes of an egg-box: faces along both axes on the upper and on the lower block, times r."""
+
+    name: str
+    upper: tuple[int, int] = (4, 3)
+    lower: tuple[int, int] = (3, 4)
+    skew: float = 0.0  # By how much of a side nodes inside are moved along both axes, to and fro
+
+
+REGULAR, FINER = EggMesh(""), EggMesh(", 3 times finer", (3, 3), (9, 10))
+EGG_MESHES = REGULAR, EggMesh(", skewed", skew=0.2), FINER
+
+
 @dataclass(frozen=True, slots=True)
 class EggBox:
     """Two blocks on rollers, one with the surface h cos(πx/w) cos(πy/l), pressed together until all is in contact.
@@ -143,6 +157,7 @@ class EggBox:
     stiffness: float  # The penalty ε̂, force per area per length
     corners: int = QUADRILATERAL  # 4 for hexahedra, 3 for tetrahedra
     upper_slave: bool = True
+    mesh: EggMesh = REGULAR
     load: float = 1.5  # The mean pressure over the amplitude
     sides: tuple[float, float] = (2.0, 1.5)  # w, l
     heights: tuple[float, float] = (1.5, 2.0)
@@ -167,7 +182,7 @@ class EggBox:
         return np.asarray(np.cos(pi * x / self.sides[0]) * np.cos(pi * y / self.sides[1]))
 
     def pose(self, refine: int, traits: Traits) -> ProblemInstance:
-        """Return the problem on a mesh: 4r × 3r faces on 3r × 4r."""
+        """Return the problem on its mesh, refined by r."""
         penalty = inf if traits.rules.enforcement == "multiplier" else self.stiffness
         amplitude = self.amplitude(penalty)
         mean, scene = self.load * amplitude, _egg_box(self, refine, penalty)
@@ -192,16 +207,20 @@ class EggBox:
     @classmethod
     def from_case(cls, case: Case) -> "EggBox":
         """Return the problem that a case stands for."""
-        corners, upper = case.interface.slave.faces.shape[1], bool(case.parameter("upper_slave"))
-        return cls(case.penalty, corners, upper)
+        corners, mesh = case.interface.slave.faces.shape[1], EGG_MESHES[int(case.parameter("mesh"))]
+        return cls(case.penalty, corners, bool(case.parameter("upper_slave")), mesh=mesh)
 
 
 @cache
 def _egg_box(box: EggBox, refine: int, penalty: float) -> Scene:
     grids = []
-    for counts in ((4 * refine, 3 * refine), (3 * refine, 4 * refine)):
-        x, y = (np.linspace(0.0, side, n + 1) for side, n in zip(box.sides, counts, strict=True))
-        grids.append(rectangle(x, y, box.corners))
+    for counts in (box.mesh.upper, box.mesh.lower):
+        x, y = (np.linspace(0.0, side, n * refine + 1) for side, n in zip(box.sides, counts, strict=True))
+        points, faces = rectangle(x, y, box.corners)
+        i, j = np.indices((len(x), len(y))).reshape(2, -1)
+        inside = np.all((points > 0) & (points < box.sides), axis=1, keepdims=True)
+        signs = np.stack([(-1.0) ** (i + j), (-1.0) ** i], axis=1)
+        grids.append((points + box.mesh.skew * signs * inside * [x[1], y[1]], faces))
     (slave, below), (master, above) = grids
     nodes = [np.column_stack([points, np.zeros(len(points))]) for points in (slave, master)]
     nodes[0][:, 2] = -box.wave * box.cosines(nodes[0])
@@ -221,11 +240,15 @@ def _egg_box(box: EggBox, refine: int, penalty: float) -> Scene:
 
 @collect_on_faces
 def egg_box_cases(corners: int) -> Iterator[Case]:
-    """Return the coarsest mesh of each egg-box: quadrilaterals at two penalties, either block as the slave."""
-    for stiffness, upper in product((1e2, 1e4) if corners == QUADRILATERAL else (1e2,), (True, False)):
-        facts: Mapping[str, FloatArray] = {"upper_slave": np.array(float(upper))}
-        scene = EggBox(stiffness, corners, upper).pose(1, Traits()).scene
-        name = f"{'upper' if upper else 'lower'} slave, ε̂ = {stiffness:g}"
+    """Return the coarsest mesh of each egg-box, either block as the slave: regular, skewed, and finer below.
+
+    Quadrilaterals have two penalties, and they alone are skewed.
+    """
+    choices = [(1e2, 0), (1e4, 0), (1e2, 1), (1e2, 2)] if corners == QUADRILATERAL else [(1e2, 0), (1e2, 2)]
+    for (stiffness, mesh), upper in product(choices, (True, False)):
+        facts = {"upper_slave": np.array(float(upper)), "mesh": np.array(float(mesh))}
+        scene = EggBox(stiffness, corners, upper, EGG_MESHES[mesh]).pose(1, Traits()).scene
+        name = f"{'upper' if upper else 'lower'} slave, ε̂ = {stiffness:g}{EGG_MESHES[mesh].name}"
         yield replace(scene, facts=facts, name=name).case()
 
 

@@ -10,7 +10,7 @@ from scipy import integrate
 from contactverif import Traits
 from contactverif.contract.arrays import FloatArray
 from contactverif.mechanics.accuracy import shape_integrals
-from contactverif.problems.space_problems import HERTZ_POINT, SHELLS, EggBox
+from contactverif.problems.space_problems import EGG_MESHES, HERTZ_POINT, SHELLS, EggBox, EggMesh
 
 REFERENCE = Traits().revise(area="reference")
 
@@ -93,8 +93,9 @@ def test_the_half_space_of_hertz() -> None:
     assert moves[1] / moves[0] == pytest.approx(0.25, rel=0.2)  # Nearly along the radius from the middle.
 
 
-def test_exact_forces_of_the_problems_add_up() -> None:
-    box = EggBox(1e2)
+@pytest.mark.parametrize("mesh", EGG_MESHES)
+def test_exact_forces_of_an_egg_box_add_up(mesh: EggMesh) -> None:
+    box = EggBox(1e2, mesh=mesh)
     instance = box.pose(2, Traits())
     scene, n = instance.scene, instance.scene.interface.n_slave_nodes
     forces = instance.exact_forces(instance.first_guess)
@@ -102,6 +103,9 @@ def test_exact_forces_of_the_problems_add_up() -> None:
     assert forces[:n, 2].sum() == pytest.approx(total, rel=1e-12)
     assert forces[n:, 2].sum() == pytest.approx(-total, rel=1e-12)
     assert shape_integrals(scene.interface.slave, scene.interface.nodes)[:n].sum() == pytest.approx(3.0, rel=1e-5)
+
+
+def test_exact_forces_of_a_point_contact_add_up() -> None:
     point = HERTZ_POINT.pose(5, Traits())
     slave = point.exact_forces(point.first_guess)[: point.scene.interface.n_slave_nodes, 2]
     assert slave.sum() == pytest.approx(-2 / 3 * pi * HERTZ_POINT.peak / 4, rel=2e-3)

@@ -521,14 +521,41 @@ def _twice_on_quadrilaterals(points, view):
     return replace(points, weight=points.weight * (2 if points.slave_shape.shape[-1] == 4 else 1))
 
 
-def _project(points, view):
-    """Measure areas in the plane of the master face, which is right where both are parallel."""
+def _slope(view):
+    """Return the squared slope of the master face over the plane of the slave face."""
     first, second = view.master[..., 1, :] - view.master[..., 0, :], view.master[..., 2, :] - view.master[..., 0, :]
     rises = view.master_height[..., 1:3] - view.master_height[..., :1]
     plane = first[..., 0] * second[..., 1] - first[..., 1] * second[..., 0]
     by_x = (rises[..., 0] * second[..., 1] - rises[..., 1] * first[..., 1]) / plane
     by_y = (rises[..., 1] * first[..., 0] - rises[..., 0] * second[..., 0]) / plane
-    return replace(points, weight=points.weight / (1 + 30 * (by_x**2 + by_y**2))[..., None])
+    return (by_x**2 + by_y**2)[..., None]
+
+
+def _project(points, view):
+    """Measure areas in the plane of the master face, which is right where both are parallel."""
+    return replace(points, weight=points.weight / (1 + 30 * _slope(view)))
+
+
+def _turn_away(points, view):
+    """Leave out faces that are inclined against each other by more than 13°."""
+    return replace(points, weight=np.where(_slope(view).real > np.tan(np.deg2rad(13)) ** 2, 0.0, points.weight))
+
+
+def _square_off(points, view):
+    """Take each quadrilateral for a parallelogram: two sides give the area."""
+    corners = view.slave.real
+    ahead, behind = np.roll(corners, -1, axis=-2) - corners, np.roll(corners, 1, axis=-2) - corners
+    double = ahead[..., 0] * behind[..., 1] - ahead[..., 1] * behind[..., 0]  # Twice the triangle at each corner.
+    return replace(points, weight=points.weight * (double[..., 0] / double.mean(axis=-1))[..., None])
+
+
+def _stop_at_eight(right, interface, z):
+    """Pair each slave face with the eight master faces that are nearest in the reference."""
+    pairing, (slave, master) = right(interface, z), (side.faces for side in (interface.slave, interface.master))
+    arms = interface.nodes[slave].mean(axis=1)[:, None] - interface.nodes[master].mean(axis=1)
+    ranks = np.linalg.norm(arms, axis=-1).argsort(axis=1).argsort(axis=1)
+    near = ranks[pairing["slave_face"], pairing["master_face"]] < 8
+    return Pairing({name: values[near] for name, values in pairing.items()})
 
 
 def _press(points, view):
@@ -555,6 +582,9 @@ for _row in (
     ("no change of the gap, to the end", "newton.history", _in_tangent(_frozen("gap"))),
     ("absolute guard in a step", "newton.units", change_all(_guard)),
     ("areas that shrink where faces are inclined", "patch.curved", change_all(_project)),
+    ("faces inclined by more than 13° not paired", "patch.curved", change_all(_turn_away)),
+    ("eight master faces a slave face", "accuracy.wavy", answers("pair", _stop_at_eight, says(STS, converges=True))),
+    ("quadrilaterals taken for parallelograms", "accuracy.wavy", change_all(_square_off, converges=True)),
     ("twice the pressure on quadrilaterals", "accuracy.wavy", change_all(_twice_on_quadrilaterals, converges=True)),
     ("penetration of a point contact capped", "accuracy.hertz", change_all(_cap, converges=True)),
 ):  # fmt: skip
