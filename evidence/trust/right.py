@@ -119,13 +119,15 @@ def count_stranger(key: str) -> list[str]:
 
 # Formulations on faces.
 ON_FACES = ("sts-3d", "mortar-3d", "vts-cell-3d", "vts-ppt-3d", "vts-ppt-balanced-3d", "nts-3d", "nts-ar-3d")
-EXAMPLES_FACES = 700  # Random cases of each property and formulation. A list of cases is asked once.
+# Random cases of each property and formulation, and where bodies are solved. A list of cases is asked once.
+EXAMPLES_FACES, EXAMPLES_IN_SPACE = 700, 300
 
 
 @cache
 def face_cases(question: Property) -> tuple[Case, ...]:
     """Return the cases of a variant of a property."""
-    return draw_cases(question.cases(None), seed=f"faces/{question.id}", examples=EXAMPLES_FACES).cases
+    examples = EXAMPLES_IN_SPACE if question.bodies else EXAMPLES_FACES
+    return draw_cases(question.cases(None), seed=f"faces/{question.id}", examples=examples).cases
 
 
 def count_on_faces(key: str) -> list[str]:
