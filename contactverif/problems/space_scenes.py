@@ -15,8 +15,9 @@ from contactverif.contract.case import Case
 from contactverif.contract.interface import Interface
 from contactverif.mechanics.scene import Scene
 from contactverif.problems.catalogue import MODERATE_PENALTY
-from contactverif.problems.flat_states import SpaceMotion, collect_on_faces
+from contactverif.problems.flat_states import BY_THIRDS, SpaceMotion, collect_on_faces, rotation
 from contactverif.problems.space_blocks import rectangle, space_blocks
+from contactverif.problems.stability_states import STIFFNESS_DECADES
 
 Lines = Sequence[float]
 SIDE, _STRAIN = 12.0, 2.0**-6  # The side of a square, and the pressure over the softer body's E.
@@ -65,6 +66,24 @@ def contrast_space_scenes(corners: int) -> Iterator[Case]:
         (("10 E/h", MODERATE_PENALTY), ("1e5 E/h", 1e5)),
     ):
         yield _name(f"{mesh}, E ratio {ratio}, ε̂ = {label}", _blocks(corners, slave, master, float(ratio), stiff=stiff))
+
+
+@collect_on_faces
+def stability_space_scenes(corners: int) -> Iterator[Case]:
+    """Return two blocks at penalties from soft springs to far beyond what doubles can carry.
+
+    The parameters "turn" (4,), a quaternion, and "shift" (3,) are a motion that rounds no coordinate.
+    """
+    step = rotation(BY_THIRDS)[1] * 2.0**-43
+    slave, master = (
+        np.round(np.array(lines) / step) * step for lines in ([0.0, 2.7, 5.9, 8.3, SIDE], [0.0, 4.6, 7.1, SIDE])
+    )
+    motion = {"turn": np.array(BY_THIRDS, dtype=np.float64), "shift": np.zeros(3)}
+    for decade in STIFFNESS_DECADES[2::3]:
+        stiff = 10.0**decade
+        scene = _blocks(corners, slave.tolist(), master.tolist(), 1.0, stiff=stiff, pressure=2.0**-10)
+        facts = {**scene.facts, **motion, "stiffness": np.array(stiff)}
+        yield _name(f"stiffness-1e{decade}", replace(scene, facts=facts))
 
 
 @collect_on_faces

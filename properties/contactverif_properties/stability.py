@@ -25,6 +25,8 @@ from contactverif.mechanics.system import System
 from contactverif.oracle.flat_answers import uniform_pressure_weights_exact
 from contactverif.problems import refined_blocks
 from contactverif.problems.blocks import exact_unknowns, pressure_of
+from contactverif.problems.flat_states import rotation
+from contactverif.problems.space_scenes import stability_space_scenes
 from contactverif.problems.stability_states import stability_scenes, stability_states
 from contactverif.strategies.flat import exact_flat_cases, linear_flat_cases
 from contactverif.strategies.surfaces import translated_surface_cases
@@ -276,29 +278,30 @@ def stability_sweep(case: Case, subject: Subject) -> Measurement:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ExactMotion:
-    """A rotation by a Pythagorean triple, and a translation behind it."""
+    """A rotation by a Pythagorean triple, or by a quaternion of integers, and a translation behind it."""
 
-    matrix: FloatArray  # (2, 2) The rotation times the hypotenuse, in integers.
-    hypotenuse: float
-    shift: FloatArray  # (2,) The translation, a length each.
+    matrix: FloatArray  # (dim, dim) The rotation times its size, in integers.
+    size: float  # The hypotenuse of the triple, or the square of the quaternion's length.
+    shift: FloatArray  # (dim,) The translation, a length each.
 
     @classmethod
     def from_case(cls, case: Case) -> ExactMotion:
-        """Return the motion that the parameters "turn", the legs of the triple, and "shift" of a case describe."""
-        a, b = case.parameters["turn"]
-        return cls(np.array([[a, -b], [b, a]]), float(np.hypot(a, b)), case.parameters["shift"])
+        """Return the motion of the parameters "turn", the legs of the triple or the quaternion, and "shift"."""
+        a, b, *others = turn = case.parameters["turn"].astype(int).tolist()
+        matrix, size = rotation(turn) if others else ([[a, -b], [b, a]], np.hypot(a, b))
+        return cls(np.array(matrix, dtype=np.float64), float(size), case.parameters["shift"])
 
     def move(self, positions: FloatArray) -> FloatArray:
-        """Return the positions (n, 2) after the motion, exact for multiples of the triple's hypotenuse."""
-        return (positions / self.hypotenuse) @ self.matrix.T + self.shift
+        """Return the positions (n, dim) after the motion, exact for multiples of the rotation's size."""
+        return (positions / self.size) @ self.matrix.T + self.shift
 
     def turn(self, vectors: FloatArray) -> FloatArray:
-        """Return vectors (n, 2) after the rotation, each component rounded like a sum of two products."""
-        return (vectors @ self.matrix.T) / self.hypotenuse
+        """Return vectors (n, dim) after the rotation, each component rounded like a sum of products."""
+        return (vectors @ self.matrix.T) / self.size
 
     def turn_back(self, vectors: FloatArray) -> FloatArray:
-        """Return vectors (n, 2) before the rotation."""
-        return (vectors @ self.matrix) / self.hypotenuse
+        """Return vectors (n, dim) before the rotation."""
+        return (vectors @ self.matrix) / self.size
 
 
 ROUNDINGS = roundoff.forces_quantity("error of a solved force in roundings")
@@ -341,13 +344,13 @@ class _TurnedSystem:
     def forces(self, u: FloatArray) -> FloatArray:
         """Return the residual of the formulation (n_unknowns,) at the unknowns u (n_free,), turned."""
         nodes = self.system.scene.interface.nodes
-        displacements = self.system.state(u).reshape(-1, 2) - nodes
+        displacements = self.system.state(u).reshape(nodes.shape) - nodes
         z = (self.interface.nodes + self.motion.turn(displacements)).reshape(-1)
         return self.system.formulation.residual(self.interface, self.pairing, z)
 
     def residual(self, u: FloatArray) -> FloatArray:
         """Return the residual (n_free,) of bodies and contact at the unknowns u (n_free,)."""
-        forces = self.motion.turn_back(self.forces(u).reshape(-1, 2)).reshape(-1)
+        forces = self.motion.turn_back(self.forces(u).reshape(self.interface.nodes.shape)).reshape(-1)
         residual: FloatArray = self.system.transformation.T @ forces + self.system.scene.bulk_forces(u)
         return residual
 
@@ -357,6 +360,7 @@ class _TurnedSystem:
     rank=580,
     quantities=(ROUNDINGS,),
     cases=Cases.from_list(stability_scenes),
+    cases_in_space=Cases.from_list(stability_space_scenes),
     linear=LINEAR_FORCES,
     promise=lambda traits: traits.promises.translation_stable,
     applicable=_refuse_without_solution,
@@ -377,7 +381,8 @@ def stability_stiffness(case: Case, subject: Subject) -> Measurement:
     of the exact solution. Newton's method, with the tangent that the formulation calls exact, goes on down to roundoff.
     The forces are compared, and the error is counted in roundings, ω (see the shared measure of conditioning). The
     derivative K is here that of bodies and contact together, the matrix of the system. The tolerance is 16. The scenes
-    are a finite list.
+    are a finite list. In space there are five penalties from 1 to 1e12 E/h, each on 16 rectangles against 9, and with
+    these cut into triangles.
 
     **Undecided.** A case is undecided if the system has no inverse in floats, or if Newton's method does not settle on
     the frozen pairing.
@@ -392,8 +397,8 @@ def stability_stiffness(case: Case, subject: Subject) -> Measurement:
             system = System(scene, subject.for_case(replace(case, penalty=penalty / GROWTH**n)))
             u, matrix = _solve(system, pairing, u)
         rounding = SETTLED_ROUNDINGS * UNIT_ROUNDOFF * penalty * case.largest_coordinate
-        mean_segment = float(case.interface.slave.lengths(case.interface.nodes).mean())
-        settled = (SETTLED_SHARE * pressure_of(case, penalty) + rounding) * mean_segment
+        mean_face = float(case.interface.slave.measures(case.interface.nodes).mean())
+        settled = (SETTLED_SHARE * pressure_of(case, penalty) + rounding) * mean_face
         if np.abs(system.residual(u, pairing)).max() > settled:
             return Measurement(undecided="Newton's method does not settle on the frozen pairing")
         turned = _TurnedSystem(system, motion, scene.interface.at(motion.move(scene.interface.nodes)), pairing)
@@ -408,7 +413,7 @@ def stability_stiffness(case: Case, subject: Subject) -> Measurement:
     distances = np.abs(positions - positions.mean(axis=0)).reshape(-1)
     bulk = transformation @ (abs(dense(scene.stiffness)) @ (transformation.T @ distances))
     reach = np.array(conditioning.reach)
-    reach[: scene.interface.n_nodes] += np.hypot(*bulk.reshape(-1, 2).T)
+    reach[: scene.interface.n_nodes] += np.hypot.reduce(bulk.reshape(positions.shape), axis=1)
     conditioning = replace(conditioning, reach=reach)
     idle, action = not state.forces.any(), f"solved at ε̂ = {case.penalty:.4g}, then turned and {_moved_by(case)}"
     return roundoff.make_sweep_measurement(ROUNDINGS, conditioning, error, idle=idle, action=action)

@@ -40,6 +40,7 @@ from contactverif.problems.refined_blocks import (
     wave_blocks,
     wave_cases,
 )
+from contactverif.problems.space_scenes import stability_space_scenes
 from contactverif.problems.stability_states import SWEEPS, stability_scenes, stability_states
 from contactverif.run.run import run
 from contactverif.sampling.draw import draw_cases
@@ -378,6 +379,38 @@ def test_multipliers_have_no_stiffness_to_sweep() -> None:
     (row,) = run([load_subject("mortar-lm")], [stability_stiffness], examples=1).rows
     assert row.verdict is Verdict.NOT_APPLICABLE
     assert row.reason == "the enforcement is by a multiplier, not by springs of a stated stiffness"
+
+
+SPACE_SCENES = stability_space_scenes((3, 4))
+
+
+def test_the_motion_of_a_scene_in_space_rounds_no_node() -> None:
+    interface, motion = SPACE_SCENES[0].interface, ExactMotion.from_case(SPACE_SCENES[0])
+    exact = [[Fraction(x) for x in node] for node in interface.nodes.tolist()]
+    rows = [[Fraction(int(entry), int(motion.size)) for entry in row] for row in motion.matrix]
+    turned = [[sum(a * x for a, x in zip(row, node, strict=True)) for row in rows] for node in exact]
+    assert [[Fraction(x) for x in node] for node in motion.move(interface.nodes).tolist()] == turned
+    assert np.array_equal(motion.turn_back(motion.move(interface.nodes)), interface.nodes)
+
+
+@pytest.mark.parametrize(
+    "name", ["sts-3d", "mortar-3d", "vts-ppt-3d", "vts-ppt-3d:normal=slave", "nts-3d", "nts-ar-3d"]
+)
+def test_forces_of_a_solution_in_space_keep_their_digits(name: str) -> None:
+    (row,) = run([load_subject(name)], [stability_stiffness]).rows
+    assert (row.verdict, row.judged) == (Verdict.PASS, row.planned), row.reason
+    assert row.closest.number.value <= 2
+
+
+def test_points_that_are_rounded_far_away_lose_digits_of_a_solution_in_space() -> None:
+    def residual(right: Any, interface: Interface, pairing: Any, z: Any) -> Any:
+        far = 2.0**10 * np.abs(z).max()
+        return right(interface, pairing, (z + far) - far)
+
+    for case in SPACE_SCENES:
+        outcome = judge_case(stability_stiffness, case, with_verbs("sts-3d", residual=residual))
+        verdicts = {Verdict.FAIL} if case.parameter("stiffness") < 1e7 else {Verdict.FAIL, Verdict.UNDECIDED}
+        assert outcome.verdict in verdicts, case.name
 
 
 QUESTION = load_property("stability.locking")

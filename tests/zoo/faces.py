@@ -589,3 +589,11 @@ for _row in (
     ("penetration of a point contact capped", "accuracy.hertz", change_all(_cap, converges=True)),
 ):  # fmt: skip
     add(*_row)
+
+
+@mutant("stiff springs that lose digits, on faces", "stability.stiffness", "residual", NTS_AR)
+def _(right, *state):
+    """Add a number to the forces of springs beyond 1e5, and subtract it again."""
+    penalty = right.__self__.penalty
+    large = 1e4 * penalty if penalty > 1e5 else 0.0
+    return (right(*state) + large) - large
