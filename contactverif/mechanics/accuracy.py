@@ -147,6 +147,14 @@ def pressure_error(solution: Solution, exact: Field, scale: float) -> float | No
     return float(np.sqrt(np.average(errors**2, weights=weights[counted]))) / scale
 
 
+def mass_matrix(surface: Surface, positions: FloatArray) -> sparse.csc_array:
+    """Return ∫N_i N_j ds (n_nodes, n_nodes); 0 at other nodes."""
+    shapes, _, weights = _quadrature(surface, positions, 1)
+    entries, (faces, n) = np.einsum("pe,pf,sp->sef", shapes, shapes, weights), (surface.faces, surface.faces.shape[1])
+    places = np.repeat(faces, n, axis=1).ravel(), np.tile(faces, (1, n)).ravel()
+    return sparse.csc_array((entries.ravel(), places), shape=(len(positions),) * 2)
+
+
 def best_pressure_error(surface: Surface, positions: FloatArray, exact: Field, scale: float) -> float:
     """Return the root mean square error of the best pressure on a mesh, over a pressure `scale`.
 
@@ -156,12 +164,9 @@ def best_pressure_error(surface: Surface, positions: FloatArray, exact: Field, s
     shapes, places, weights = _quadrature(surface, positions, _PARTS_OF_EDGE)
     values = exact(places.reshape(-1, places.shape[-1])).reshape(weights.shape)
     nodes, corners = np.unique(surface.faces, return_inverse=True)
-    corners, n = corners.reshape(surface.faces.shape), surface.faces.shape[1]
+    corners = corners.reshape(surface.faces.shape)
     right = np.bincount(corners.ravel(), np.einsum("pe,sp->se", shapes, values * weights).ravel(), len(nodes))
-    entries = np.einsum("pe,pf,sp->sef", shapes, shapes, weights).ravel()
-    rows, columns = np.repeat(corners, n, axis=1).ravel(), np.tile(corners, (1, n)).ravel()
-    mass = sparse.csc_array((entries, (rows, columns)), shape=(len(nodes), len(nodes)))
-    best = linalg.spsolve(mass, right)
+    best = linalg.spsolve(mass_matrix(surface, positions)[nodes][:, nodes], right)
     return float(np.sqrt(np.average((best[corners] @ shapes.T - values) ** 2, weights=weights))) / scale
 
 

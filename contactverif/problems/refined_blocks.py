@@ -8,7 +8,7 @@ every point closed, so that the answer to the wave is linear: the difference bet
 `matching_answer` is that of two meshes whose nodes coincide, joined by springs; it knows no contact formulation.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from itertools import product
@@ -19,10 +19,13 @@ from scipy import linalg
 from contactverif.contract.arrays import FloatArray, dense
 from contactverif.contract.body import Body
 from contactverif.contract.case import Case
+from contactverif.contract.interface import SEGMENT, Surface
+from contactverif.mechanics.accuracy import mass_matrix, traction_forces
 from contactverif.mechanics.bodies import Rectangle
 from contactverif.mechanics.scene import Scene
 from contactverif.problems.blocks import two_blocks
-from contactverif.problems.flat_states import collect
+from contactverif.problems.flat_states import collect, collect_on_faces
+from contactverif.problems.space_blocks import facing_grids, space_blocks
 
 LENGTH, HEIGHT = 4.0, 1.0  # Of each block, lengths.
 POISSON = 0.3
@@ -73,29 +76,40 @@ WAVE = MEAN_PRESSURE / 64  # The amplitude p1.
 COLUMNS = ((8, 12), (12, 8))  # The segments of slave and master.
 SOFT = 10.0  # The softest penalty ε̂ h/E, h the slave segment. Nothing locks there.
 PENALTIES = (SOFT, 1e2, 1e4, 1e6, 1e8)
-_GAUSS = np.polynomial.legendre.leggauss(8)  # Exact to roundoff for an eighth of a wave.
 
 
 @cache
-def wave_blocks(n_slave: int, n_master: int, penalty: float, *, wave: float) -> Scene:
-    """Return two blocks under the mean pressure and a wave of an amplitude, force per length; 0 leaves it out.
+def wave_blocks(n_slave: int, n_master: int, penalty: float, *, wave: float, corners: int = SEGMENT) -> Scene:
+    """Return two blocks under the mean pressure and a wave of an amplitude, force per length or area; 0 leaves it out.
 
     The segments of the master shorten from left to right, unless both numbers agree. The penalty is ε̂ h/E, with the
     slave segment h. The facts are those of a uniform pressure without the wave, and "columns" (2,) and "stiffness" ().
+    Faces with 3 or 4 corners make blocks in space, as wide as they are high.
     """
     distributed = penalty * n_slave / LENGTH
-    uniform = _uniform_blocks(n_slave, n_master)
+    uniform = _uniform_blocks(n_slave, n_master, corners)
     numbers = {"columns": np.array([n_slave, n_master], dtype=np.float64), "stiffness": np.array(penalty)}
     if not wave:
         return replace(uniform, penalty=distributed, facts={**uniform.facts, **numbers})
-    return replace(uniform, bodies=_wavy_bodies(n_slave, n_master, wave), penalty=distributed, facts=numbers)
+    return replace(uniform, bodies=_wavy_bodies(n_slave, n_master, wave, corners), penalty=distributed, facts=numbers)
 
 
 @collect
 def wave_cases() -> Iterator[Case]:
     """Return the scenes of both choices of the slave at all penalties, under the mean pressure."""
-    for columns, penalty in product(COLUMNS, PENALTIES):
-        yield replace(wave_blocks(*columns, penalty, wave=0.0), name=case_name(columns, penalty)).case()
+    yield from _wave_cases(PENALTIES, SEGMENT)
+
+
+@collect_on_faces
+def wave_space_cases(corners: int) -> Iterator[Case]:
+    """Return the same scenes in space at two penalties: where locking begins, and far beyond."""
+    yield from _wave_cases(PENALTIES[1::3], corners)
+
+
+def _wave_cases(penalties: Sequence[float], corners: int) -> Iterator[Case]:
+    for columns, penalty in product(COLUMNS, penalties):
+        scene = wave_blocks(*columns, penalty, wave=0.0, corners=corners)
+        yield replace(scene, name=case_name(columns, penalty)).case()
 
 
 def case_name(columns: tuple[int, int], penalty: float) -> str:
@@ -112,22 +126,20 @@ class WaveAnswer:
 
 
 @cache
-def matching_answer(n_columns: int, distributed: float) -> WaveAnswer:
+def matching_answer(n_columns: int, distributed: float, corners: int = SEGMENT) -> WaveAnswer:
     """Return the answer of matching meshes, whose gap is integrated exactly against a distributed stiffness."""
-    scene = _uniform_blocks(n_columns, n_columns)
-    interface, length = scene.interface, LENGTH / n_columns
-    slave, master = np.split(np.arange(interface.n_nodes), [interface.n_slave_nodes])
-    slave, master = (side[np.argsort(interface.nodes[side, 0])] for side in (slave, master))
-    gaps = np.zeros((n_columns + 1, interface.n_unknowns))
-    places = np.arange(n_columns + 1)
-    gaps[places, 2 * slave + 1], gaps[places, 2 * master + 1] = 1.0, -1.0
+    scene = _uniform_blocks(n_columns, n_columns, corners)
+    interface = scene.interface
+    sides = np.split(np.arange(interface.n_nodes), [interface.n_slave_nodes])
+    slave, master = (side[np.lexsort(interface.nodes[side].T)] for side in sides)
+    gaps, places = np.zeros((len(slave), interface.n_unknowns)), np.arange(len(slave))
+    gaps[places, interface.dim * (slave + 1) - 1], gaps[places, interface.dim * (master + 1) - 1] = 1.0, -1.0
     gaps = gaps @ dense(scene.transformation)
-    mass = length / 6 * (np.diag(np.r_[2, np.full(n_columns - 1, 4.0), 2]) + np.eye(n_columns + 1, k=1))
-    mass += length / 6 * np.eye(n_columns + 1, k=-1)
+    mass = mass_matrix(interface.slave, interface.nodes).toarray()[np.ix_(slave, slave)]
     # The pressure p is an unknown too, with M (g − p/ε̂) = 0: the matrix stays regular however stiff the springs are.
     transfer = gaps.T @ mass
     matrix = np.block([[dense(scene.stiffness), transfer], [transfer.T, -mass / distributed]])
-    wavy = replace(scene, bodies=_wavy_bodies(n_columns, n_columns, WAVE), facts={})
+    wavy = replace(scene, bodies=_wavy_bodies(n_columns, n_columns, WAVE, corners), facts={})
     load = np.append(wavy.load - scene.load, np.zeros(len(mass)))
     change, pressures = np.split(linalg.solve(matrix, load, assume_a="sym"), [scene.n_free])
     return WaveAnswer(wave_work(scene, wavy, np.zeros_like(change), change), float(np.ptp(pressures)) / WAVE)
@@ -140,10 +152,22 @@ def wave_work(scene: Scene, wavy: Scene, before: FloatArray, after: FloatArray) 
 
 
 @cache
-def _uniform_blocks(n_slave: int, n_master: int) -> Scene:
+def _uniform_blocks(n_slave: int, n_master: int, corners: int) -> Scene:
     rows = np.linspace(0, HEIGHT, N_ROWS + 1)
     slave_x, t = LENGTH * (np.linspace(0, 1, n_slave + 1) - 0.5), np.linspace(0, 1, n_master + 1)
     master_x = LENGTH * (t - 0.5 + (GRADING * t * (1 - t) if n_slave != n_master else 0))
+    if corners != SEGMENT:
+        slave_y, master_y = (np.linspace(0, HEIGHT, n // 4 + 1) for n in (n_slave, n_master))
+        interface, plane = facing_grids((slave_x, slave_y), (master_x, master_y), corners)
+        return space_blocks(
+            interface,
+            plane,
+            np.array([[-LENGTH, 0], [LENGTH, 0], [LENGTH, 2 * HEIGHT], [-LENGTH, 2 * HEIGHT]]) / 2,
+            layers=(np.diff(rows).tolist(),) * 2,
+            materials=((1.0, POISSON),) * 2,
+            penalty=1.0,
+            pressure=MEAN_PRESSURE,
+        )
     return two_blocks(
         Rectangle(slave_x, rows, poisson=POISSON),
         Rectangle(master_x, rows - HEIGHT, poisson=POISSON),
@@ -152,17 +176,12 @@ def _uniform_blocks(n_slave: int, n_master: int) -> Scene:
 
 
 @cache
-def _wavy_bodies(n_slave: int, n_master: int, wave: float) -> tuple[Body, Body]:
+def _wavy_bodies(n_slave: int, n_master: int, wave: float, corners: int) -> tuple[Body, Body]:
     """Return both blocks, the slave with the load of a wave of that amplitude on its top."""
-    slave, master = _uniform_blocks(n_slave, n_master).bodies
-    top = np.flatnonzero(slave.nodes[:, 1] == HEIGHT)
-    x, (points, weights) = slave.nodes[top, 0], _GAUSS
-    share = (points + 1) / 2  # (n_points,)
-    places = x[:-1, None] + np.diff(x)[:, None] * share  # (n_segments, n_points)
-    forces = np.cos(2 * np.pi * places / LENGTH) * np.diff(x)[:, None] * weights / 2
-    nodal = np.zeros(len(x))  # ∫N cos(2πx/L) dx
-    nodal[:-1] += forces @ (1 - share)
-    nodal[1:] += forces @ share
-    load = np.array(slave.load)
-    load[top, 1] -= wave * nodal
-    return replace(slave, load=load), master
+    slave, master = _uniform_blocks(n_slave, n_master, corners).bodies
+
+    def traction(places: FloatArray) -> FloatArray:
+        return np.outer(np.cos(2 * np.pi * places[:, 0] / LENGTH), np.eye(slave.dim)[-1])
+
+    top = Surface(slave.contact + len(slave.nodes) - len(slave.contact_nodes))
+    return replace(slave, load=slave.load - wave * traction_forces(top, slave.nodes, traction)), master

@@ -149,6 +149,15 @@ def rectangle(x: FloatArray, y: FloatArray, corners: int) -> tuple[FloatArray, I
     return points, np.vstack([faces[:, :3], faces[:, [0, 2, 3]]]) if corners == TRIANGLE else faces
 
 
+def facing_grids(
+    slave: tuple[FloatArray, FloatArray], master: tuple[FloatArray, FloatArray], corners: int
+) -> tuple[Interface, FloatArray]:
+    """Return the interface of two grids in the plane z = 0, each with its x and y, and the plane (n_nodes, 2)."""
+    (above, below), (under, upper) = (rectangle(*lines, corners) for lines in (slave, master))
+    flat = [np.column_stack([points, np.zeros(len(points))]) for points in (above, under)]
+    return Interface.from_faces(flat[0], below[:, ::-1], flat[1], upper), np.vstack([above, under])
+
+
 def _mark_rollers(surface: Surface, plane: FloatArray) -> BoolArray:
     """Return which of both components (n, 2) of each node the rollers at the sides hold.
 

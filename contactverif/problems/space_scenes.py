@@ -12,11 +12,10 @@ from typing import Any
 import numpy as np
 
 from contactverif.contract.case import Case
-from contactverif.contract.interface import Interface
 from contactverif.mechanics.scene import Scene
 from contactverif.problems.catalogue import MODERATE_PENALTY
 from contactverif.problems.flat_states import BY_THIRDS, SpaceMotion, collect_on_faces, rotation
-from contactverif.problems.space_blocks import rectangle, space_blocks
+from contactverif.problems.space_blocks import facing_grids, space_blocks
 from contactverif.problems.stability_states import STIFFNESS_DECADES
 
 Lines = Sequence[float]
@@ -28,15 +27,13 @@ _FINE, _COARSE = np.linspace(0.0, SIDE, 7).tolist(), [0.0, 7.0, SIDE]
 
 def _blocks(corners: int, slave: Lines, master: Lines, ratio: float, *, stiff: float, **others: Any) -> Scene:
     """Return two blocks over grids with the same lines along both axes; ε̂ is in E/h of the softer body."""
-    (above, below), (under, upper) = (rectangle(np.array(lines), np.array(lines), corners) for lines in (slave, master))
-    flat = [np.column_stack([points, np.zeros(len(points))]) for points in (above, under)]
-    interface = Interface.from_faces(flat[0], below[:, ::-1], flat[1], upper)
+    interface, plane = facing_grids((np.array(slave),) * 2, (np.array(master),) * 2, corners)
     low, high = max(slave[0], master[0]), min(slave[-1], master[-1])
     penalty = stiff * min(1.0, ratio) * (len(slave) - 1) / (slave[-1] - slave[0])
     load = {"pressure": _STRAIN * min(1.0, ratio)} if "approach" not in others else {}
     return space_blocks(
         interface,
-        np.vstack([above, under]),
+        plane,
         np.array([[low, low], [high, low], [high, high], [low, high]]),
         layers=([3.0, 3.0], [3.0, 3.0]),
         materials=((1.0, 0.3), (ratio, 0.2)),

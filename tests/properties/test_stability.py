@@ -39,6 +39,7 @@ from contactverif.problems.refined_blocks import (
     matching_answer,
     wave_blocks,
     wave_cases,
+    wave_space_cases,
 )
 from contactverif.problems.space_scenes import stability_space_scenes
 from contactverif.problems.stability_states import SWEEPS, stability_scenes, stability_states
@@ -426,6 +427,28 @@ def test_what_does_not_lock_stays_far_below_both_bounds(name: str) -> None:
         assert values[ROUGHNESS.name] < 1.2
 
 
+STIFFEST_IN_SPACE = [case for case in wave_space_cases((3, 4)) if "1e8" in case.name]
+
+
+@pytest.mark.parametrize("name", ["nts-3d", "nts-ar-3d", "mortar-3d"])
+def test_what_does_not_lock_in_space_stays_far_below_both_bounds(name: str) -> None:
+    subject = load_subject(name)
+    faces = [
+        case for case in STIFFEST_IN_SPACE if case.interface.slave.faces.shape[1] in subject.traits.abilities.faces
+    ]
+    for case in faces:
+        values = measure_case(QUESTION, case, subject).values
+        assert values[DRIFT.name] < 0.002
+        assert values[ROUGHNESS.name] < 1.4
+
+
+@pytest.mark.parametrize("name", ["sts-3d", "vts-cell-3d", "vts-ppt-3d", "vts-ppt-balanced-3d", "two-pass/nts-ar-3d"])
+def test_what_locks_in_space_is_far_above_both_bounds(name: str) -> None:
+    values = measure_case(QUESTION, STIFFEST_IN_SPACE[1], load_subject(name)).values
+    assert values[DRIFT.name] > 0.3
+    assert values[ROUGHNESS.name] > 50
+
+
 @pytest.mark.parametrize("name", ["sts", "vts-g", "vts-me", "vts-ppt", "vts-ppt-balanced", "two-pass/nts-ar"])
 def test_what_locks_is_far_above_both_bounds(name: str) -> None:
     values = measure_case(QUESTION, CASES["12 on 8, ε̂ = 1e8 E/h"], load_subject(name)).values
@@ -480,9 +503,12 @@ def test_a_formulation_without_a_pairing_is_not_judged() -> None:
 
 
 def test_matching_meshes_answer_as_a_right_formulation_does_on_them() -> None:
-    answer = answer_to_wave((8, 8), 1e4, load_subject("sts"))
-    exact = matching_answer(8, wave_blocks(8, 8, 1e4, wave=0.0).penalty)
-    assert answer.compliance == pytest.approx(exact.compliance, rel=1e-2)  # The mean pressure turns with the surface.
+    for name, corners in (("sts", 2), ("sts-3d", 3), ("sts-3d", 4)):
+        calm, wavy = (wave_blocks(8, 8, 1e4, wave=wave, corners=corners) for wave in (0.0, WAVE))
+        answer = answer_to_wave(calm, wavy, load_subject(name))
+        exact = matching_answer(8, calm.penalty, corners)
+        # The mean pressure turns with the surface.
+        assert answer.compliance == pytest.approx(exact.compliance, rel=1e-2)
 
 
 def test_the_wave_carries_no_load_in_all_and_has_its_amplitude() -> None:

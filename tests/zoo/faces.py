@@ -597,3 +597,6 @@ def _(right, *state):
     penalty = right.__self__.penalty
     large = 1e4 * penalty if penalty > 1e5 else 0.0
     return (right(*state) + large) - large
+
+
+add("springs between the nodes of faces, said not to lock", "stability.locking", says(STS, locks=False))
