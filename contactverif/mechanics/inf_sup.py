@@ -35,14 +35,14 @@ _BATCH = 64  # The number of states in one call, so that their contact points fi
 class InfSup:
     """The smallest eigenvalue of one mesh, by force rows or by gap rows, whichever is smaller."""
 
-    segment: float  # The mean slave segment h, a length.
+    segment: float  # The mean slave segment h, or the root of the mean slave face, a length.
     n_multipliers: int
     n_zero: int  # The number of independent pressures that move nothing.
     constant: float  # The smallest β that is not 0, dimensionless; 0 if all are.
 
 
 def inf_sup_constant(scene: Scene, formulation: CheckedFormulation, *, nodal: bool) -> InfSup:
-    """Return the inf-sup constant of a formulation between two bodies that touch along a straight line."""
+    """Return the inf-sup constant of a formulation between two bodies whose flat sides touch."""
     interface = scene.interface
     forces = force_rows(scene, formulation)
     gaps = gap_rows(scene, formulation)
@@ -50,7 +50,7 @@ def inf_sup_constant(scene: Scene, formulation: CheckedFormulation, *, nodal: bo
     n = interface.dim * interface.n_slave_nodes
     now, then = (np.linalg.norm(rows[:, :n], axis=1) for rows in (gaps, forces))
     gaps = gaps * (then / np.where(now > 0, now, np.inf))[:, None]
-    on_slave = forces.reshape(len(forces), -1, 2)[:, : interface.n_slave_nodes]
+    on_slave = forces.reshape(len(forces), -1, interface.dim)[:, : interface.n_slave_nodes]
     lengths = np.ones(len(forces))
     if nodal:  # Unit pressures, not forces: each stands for half of the segments beside the nodes that it pushes.
         sizes = np.linalg.norm(on_slave, axis=2)
@@ -59,7 +59,7 @@ def inf_sup_constant(scene: Scene, formulation: CheckedFormulation, *, nodal: bo
         lengths = sizes @ integrals / np.where(totals > 0, totals, 1.0)
     areas = lengths * np.linalg.norm(on_slave.sum(axis=1), axis=1)
     young = min(body.young for body in scene.bodies if not body.rigid)
-    segment = float(interface.slave.lengths(interface.nodes).mean())
+    segment = float(interface.slave.measures(interface.nodes).mean()) ** (1 / (interface.dim - 1))
     factor = linalg.cholesky(dense(scene.stiffness), lower=True)
     scale = lengths * np.sqrt(young / segment) / np.sqrt(np.where(areas > 0, areas, np.inf))
     both = []
@@ -87,13 +87,13 @@ def gap_rows(scene: Scene, formulation: CheckedFormulation) -> FloatArray:
 
     They are central differences. Of nodes that touch, only what moves across the interface opens or closes a gap.
     """
-    interface, across = scene.interface, scene.bodies[0].frame[:, 1]
+    interface, across = scene.interface, scene.bodies[0].frame[:, -1]
     n, n_nodes, count = interface.n_unknowns, interface.n_nodes, formulation.n_multipliers(interface)
-    shortest = min(float(side.lengths(interface.nodes).min()) for side in (interface.slave, interface.master))
+    shortest = min(float(side.heights(interface.nodes).min()) for side in (interface.slave, interface.master))
     step = shortest * UNIT_ROUNDOFF ** (1 / 3)
     shifts = np.zeros((n_nodes, n + count))
-    for direction in (0, 1):
-        shifts[np.arange(n_nodes), 2 * np.arange(n_nodes) + direction] = step * across[direction]
+    for direction, part in enumerate(across):
+        shifts[np.arange(n_nodes), interface.dim * np.arange(n_nodes) + direction] = step * part
     values = _residuals(scene, formulation, np.concatenate([shifts, -shifts]))[:, n:]
     derivatives = (values[:n_nodes] - values[n_nodes:]).T / (2 * step)
     rows: FloatArray = (derivatives[:, :, None] * across).reshape(len(derivatives), n)

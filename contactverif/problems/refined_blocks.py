@@ -10,7 +10,7 @@ every point closed, so that the answer to the wave is linear: the difference bet
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, partial
 from itertools import product
 
 import numpy as np
@@ -29,7 +29,7 @@ from contactverif.problems.space_blocks import facing_grids, space_blocks
 
 LENGTH, HEIGHT = 4.0, 1.0  # Of each block, lengths.
 POISSON = 0.3
-N_MESHES = 5
+N_MESHES, N_SPACE_MESHES = 5, 3
 # The segments of slave and master on the coarsest mesh.
 FAMILIES: Mapping[str, tuple[int, int]] = {"slave coarser, 2:3": (4, 6), "slave finer, 3:2": (6, 4), "matching": (4, 4)}
 _GROWTH = 1.6  # The height of a row of cells over that of the row before.
@@ -37,26 +37,57 @@ PENALTY = 10.0  # The scale of the contact decision of multipliers.
 
 
 @cache
-def refined_blocks(n_slave: int, n_master: int) -> Scene:
-    """Return two blocks that touch, with equal segments on each side; the fact "columns" (2,) has their numbers."""
+def refined_blocks(n_slave: int, n_master: int, corners: int = SEGMENT) -> Scene:
+    """Return two blocks that touch, with equal segments on each side; the fact "columns" (2,) has their numbers.
+
+    Faces with 3 or 4 corners make blocks in space, as wide as two faces of the coarser side. Their cells are cubes at
+    the interface. Rollers at the sides mirror them, so this is a part of a wide block.
+    """
     columns = [(np.linspace(0, LENGTH, n + 1), _row_lines(LENGTH / n)) for n in (n_slave, n_master)]
     (slave_x, up), (master_x, down) = columns
-    slave, master = Rectangle(slave_x, up, poisson=POISSON), Rectangle(master_x, -down[::-1], poisson=POISSON)
-    scene = two_blocks(slave, master, penalty=PENALTY, approach=0)
+    if corners == SEGMENT:
+        slave, master = Rectangle(slave_x, up, poisson=POISSON), Rectangle(master_x, -down[::-1], poisson=POISSON)
+        scene = two_blocks(slave, master, penalty=PENALTY, approach=0)
+    else:
+        scene = _blocks_in_space((slave_x, master_x), (up, down), 2 * LENGTH / min(n_slave, n_master), corners)
     return replace(scene, facts={"columns": np.array([n_slave, n_master], dtype=np.float64)})
 
 
-@collect
-def refinement_cases() -> Iterator[Case]:
+def _refinement_cases(corners: int) -> Iterator[Case]:
     """Return the coarsest mesh of each family, by its name."""
     for name, columns in FAMILIES.items():
-        yield replace(refined_blocks(*columns), name=name).case()
+        yield replace(refined_blocks(*columns, corners), name=name).case()
+
+
+refinement_cases = collect(partial(_refinement_cases, SEGMENT))
+refinement_space_cases = collect_on_faces(_refinement_cases)
 
 
 def refinements(case: Case) -> tuple[Scene, ...]:
     """Return the scenes of a family from coarse to fine, each with twice the segments of the one before."""
     n_slave, n_master = case.parameters["columns"].astype(int).tolist()
-    return tuple(refined_blocks(n_slave * 2**level, n_master * 2**level) for level in range(N_MESHES))
+    corners = case.interface.slave.faces.shape[1]
+    n_meshes = N_MESHES if corners == SEGMENT else N_SPACE_MESHES
+    return tuple(refined_blocks(n_slave * 2**level, n_master * 2**level, corners) for level in range(n_meshes))
+
+
+def _blocks_in_space(
+    x: Sequence[FloatArray], levels: Sequence[FloatArray], width: float, corners: int, pressure: float | None = None
+) -> Scene:
+    """Return two blocks with squares at the interface, or these cut in two; without a pressure the slave is held."""
+    slave_y, master_y = (np.linspace(0, width, round((len(lines) - 1) * width / LENGTH) + 1) for lines in x)
+    interface, plane = facing_grids((x[0], slave_y), (x[1], master_y), corners)
+    low, high = plane.min(axis=0), plane.max(axis=0)
+    return space_blocks(
+        interface,
+        plane,
+        np.array([low, [high[0], low[1]], high, [low[0], high[1]]]),
+        layers=(np.diff(levels[0]).tolist(), np.diff(levels[1]).tolist()),
+        materials=((1.0, POISSON),) * 2,
+        penalty=PENALTY,
+        pressure=pressure,
+        approach=0.0 if pressure is None else None,
+    )
 
 
 def _row_lines(first: float) -> FloatArray:
@@ -94,22 +125,15 @@ def wave_blocks(n_slave: int, n_master: int, penalty: float, *, wave: float, cor
     return replace(uniform, bodies=_wavy_bodies(n_slave, n_master, wave, corners), penalty=distributed, facts=numbers)
 
 
-@collect
-def wave_cases() -> Iterator[Case]:
-    """Return the scenes of both choices of the slave at all penalties, under the mean pressure."""
-    yield from _wave_cases(PENALTIES, SEGMENT)
-
-
-@collect_on_faces
-def wave_space_cases(corners: int) -> Iterator[Case]:
-    """Return the same scenes in space at two penalties: where locking begins, and far beyond."""
-    yield from _wave_cases(PENALTIES[1::3], corners)
-
-
-def _wave_cases(penalties: Sequence[float], corners: int) -> Iterator[Case]:
-    for columns, penalty in product(COLUMNS, penalties):
+def _wave_cases(corners: int) -> Iterator[Case]:
+    """Return the scenes of both choices of the slave under the mean pressure, at all penalties or in space at two."""
+    for columns, penalty in product(COLUMNS, PENALTIES if corners == SEGMENT else PENALTIES[1::3]):
         scene = wave_blocks(*columns, penalty, wave=0.0, corners=corners)
         yield replace(scene, name=case_name(columns, penalty)).case()
+
+
+wave_cases = collect(partial(_wave_cases, SEGMENT))
+wave_space_cases = collect_on_faces(_wave_cases)
 
 
 def case_name(columns: tuple[int, int], penalty: float) -> str:
@@ -157,17 +181,7 @@ def _uniform_blocks(n_slave: int, n_master: int, corners: int) -> Scene:
     slave_x, t = LENGTH * (np.linspace(0, 1, n_slave + 1) - 0.5), np.linspace(0, 1, n_master + 1)
     master_x = LENGTH * (t - 0.5 + (GRADING * t * (1 - t) if n_slave != n_master else 0))
     if corners != SEGMENT:
-        slave_y, master_y = (np.linspace(0, HEIGHT, n // 4 + 1) for n in (n_slave, n_master))
-        interface, plane = facing_grids((slave_x, slave_y), (master_x, master_y), corners)
-        return space_blocks(
-            interface,
-            plane,
-            np.array([[-LENGTH, 0], [LENGTH, 0], [LENGTH, 2 * HEIGHT], [-LENGTH, 2 * HEIGHT]]) / 2,
-            layers=(np.diff(rows).tolist(),) * 2,
-            materials=((1.0, POISSON),) * 2,
-            penalty=1.0,
-            pressure=MEAN_PRESSURE,
-        )
+        return _blocks_in_space((slave_x, master_x), (rows, rows), HEIGHT, corners, MEAN_PRESSURE)
     return two_blocks(
         Rectangle(slave_x, rows, poisson=POISSON),
         Rectangle(master_x, rows - HEIGHT, poisson=POISSON),

@@ -1,5 +1,6 @@
 """The inf-sup constant, against an eigenvalue problem that is assembled here by hand."""
 
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -7,9 +8,12 @@ import pytest
 from pressed_blocks import on
 from scipy import linalg
 from subjects import Changed, load_subject
+from zoo.face_multipliers import FaceMultipliers
 
 from contactverif import Scene, Subject
 from contactverif.contract.arrays import dense
+from contactverif.contract.interface import TRIANGLE
+from contactverif.mechanics.accuracy import shape_integrals
 from contactverif.mechanics.inf_sup import InfSup, force_rows, gap_rows, inf_sup_constant
 from contactverif.problems.refined_blocks import refined_blocks
 
@@ -62,6 +66,22 @@ def test_two_passes_have_a_zero_eigenvalue_for_each_pair_of_nodes_in_one_place()
 def test_eight_on_two_leaves_seven_pressures_of_vts_ppt_that_move_nothing() -> None:
     """The paper's page counts as many multipliers that are not unique."""
     assert constant_of("vts-ppt-lm", refined_blocks(8, 2)).n_zero == 7
+
+
+def test_dual_pressures_on_matching_faces_have_the_constant_of_the_problem_written_by_hand() -> None:
+    """Node on node, a dual pressure pushes its own node alone, by the integral of its shape function."""
+    scene = refined_blocks(4, 4, TRIANGLE)
+    interface, n = scene.interface, scene.interface.n_slave_nodes
+    areas = shape_integrals(interface.slave, interface.nodes)[:n]
+    partner = n + np.abs(interface.nodes[:n, None] - interface.nodes[n:]).sum(axis=2).argmin(axis=1)
+    rows = np.zeros((n, interface.n_unknowns))
+    rows[np.arange(n), 3 * np.arange(n) + 2], rows[np.arange(n), 3 * partner + 2] = areas, -areas
+    rows = rows @ dense(scene.transformation)
+    compliance = rows @ np.linalg.solve(dense(scene.stiffness), rows.T)
+    h = np.sqrt(areas.sum() / len(interface.slave))
+    smallest = np.sqrt(linalg.eigh(compliance, h * np.diag(areas), eigvals_only=True)[0])
+    subject = Subject("it", partial(FaceMultipliers, dual=True))
+    assert inf_sup_constant(scene, subject.for_case(scene.case()), nodal=False).constant == pytest.approx(smallest)
 
 
 class WithFactor:

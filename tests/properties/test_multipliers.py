@@ -1,12 +1,21 @@
 """`stability.inf-sup`: who is stable, who is not, and strangers."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 from subjects import load_property, load_subject, measure_case
 from textbook_springs import NodalMultipliers
+from zoo.face_multipliers import FaceMultipliers
 
 from contactverif import Case, Subject, Verdict, judge_case
-from contactverif.problems.refined_blocks import FAMILIES, N_MESHES, refinement_cases, refinements
+from contactverif.problems.refined_blocks import (
+    FAMILIES,
+    N_MESHES,
+    refinement_cases,
+    refinement_space_cases,
+    refinements,
+)
 from contactverif_properties.multipliers import CONSTANT, SEGMENT, SLOPE, ZEROS
 
 QUESTION = load_property("stability.inf-sup")
@@ -52,6 +61,23 @@ def test_a_stranger_with_nodal_multipliers_has_the_constants_of_nts() -> None:
     )
     np.testing.assert_allclose(stranger.series[CONSTANT], ours.series[CONSTANT], rtol=1e-8)
     np.testing.assert_allclose(ours.series[SEGMENT], 1 / 2.0 ** np.arange(N_MESHES))
+
+
+@pytest.mark.parametrize("dual", [False, True])
+def test_the_constants_of_mortar_methods_do_not_fall_in_space(dual: bool) -> None:
+    for case in refinement_space_cases((3,) if dual else (3, 4)):
+        measurement = measure_case(QUESTION, case, Subject("it", partial(FaceMultipliers, dual=dual)))
+        assert measurement.values[ZEROS.name] == 0
+        assert abs(measurement.values[SLOPE.name]) < 0.04
+
+
+def test_a_pressure_at_each_corner_of_each_face_is_too_many() -> None:
+    """On a finer slave most of them move nothing, and on a coarser one β falls nearly like h."""
+    subject = Subject("it", partial(FaceMultipliers, shared=False))
+    for case in refinement_space_cases((3, 4)):
+        values = measure_case(QUESTION, case, subject).values
+        assert values[ZEROS.name] >= 7
+        assert (values[SLOPE.name] > 0.8) is case.name.startswith("slave coarser")
 
 
 def test_springs_are_not_asked() -> None:

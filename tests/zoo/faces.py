@@ -5,6 +5,7 @@ only what the rule computes is wrong.
 """
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from readable_cells import centre_points
@@ -14,6 +15,7 @@ from contactverif import Pairing
 from contactverif_surfaces.cell_points import CellPoints, SlaveView, gauss_points, unit_vectors
 from contactverif_surfaces.face_search import MOST_CORNERS, find_cells
 from zoo import making
+from zoo.face_multipliers import FaceMultipliers
 from zoo.making import SPACE, answers, decides, reports, says, wrap
 
 TRANSMISSION, RESULTANT = "patch.flat.transmission", "patch.flat.resultant"
@@ -600,3 +602,5 @@ def _(right, *state):
 
 
 add("springs between the nodes of faces, said not to lock", "stability.locking", says(STS, locks=False))
+add("multipliers for each corner of a face, said to be stable", "stability.inf-sup",
+    partial(FaceMultipliers, shared=False))  # fmt: skip
