@@ -15,7 +15,7 @@ from importlib import import_module
 from inspect import getdoc
 from math import isfinite
 from sys import modules
-from typing import Annotated, Any, Literal, overload
+from typing import Any, Literal, overload
 
 from contactverif.contract.arrays import FloatArray
 from contactverif.contract.case import Case, Cases, CaseSummary
@@ -439,7 +439,7 @@ class Outcome:
         The plugin broke the contract or returned NaN: a failure that no statement excuses.
     """
 
-    case_or_summary: Annotated[Case | CaseSummary, "summary", CaseSummary]  # Stored is the summary alone.
+    case_or_summary: Case | CaseSummary
     verdict: Verdict
     reason: str = ""
     measurement: Measurement | None = None

@@ -9,11 +9,10 @@ from array import array
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache, partial
+from functools import partial
 from itertools import chain, product
 from math import sqrt
 
-from contactverif.contract import schema
 from contactverif.contract.case import Case, needs_of_place
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.interface import PLANE
@@ -27,7 +26,7 @@ from contactverif.problems.named_states import named_case
 from contactverif.run import judge
 from contactverif.run.judge import badness
 from contactverif.run.scheduler import CaseChunk
-from contactverif.run.store import Writer
+from contactverif.run.store import Writer, decode_outcome, encode_outcome
 from contactverif.sampling import draw
 from contactverif.sampling.draw import CaseSource, PlannedCases, Sampling
 from contactverif.sampling.hypothesis_draws import one_thread
@@ -45,8 +44,8 @@ class RowOutcomes(Outcomes):
         self._n_whole = whole
         self._whole: dict[int, Outcome] = {}
         self._n_failures = 0
-        self._forms: list[schema.Form] = []
-        self._numbers_of_forms: dict[schema.Form, int] = {}
+        self._forms: list[bytes] = []
+        self._numbers_of_forms: dict[bytes, int] = {}
         self._form_of = array("l")
         self._starts = array("q", [0])
         self._numbers = array("d")
@@ -67,7 +66,7 @@ class RowOutcomes(Outcomes):
             self._n_failures += number >= self._n_whole
             self._whole[number] = outcome if case is None else replace(outcome, case_or_summary=case)
         else:
-            form, numbers = schema.encode(outcome)
+            form, numbers = encode_outcome(outcome)
             form_number = self._numbers_of_forms.setdefault(form, len(self._forms))
             if form_number == len(self._forms):
                 self._forms.append(form)
@@ -86,10 +85,7 @@ class RowOutcomes(Outcomes):
         if number in self._whole:
             return self._whole[number]
         numbers = self._numbers[self._starts[number] : self._starts[number + 1]]
-        return _decoder_of(self._forms[self._form_of[number]])(numbers)
-
-
-_decoder_of = lru_cache(1000)(partial(schema.decoder, Outcome))
+        return decode_outcome(self._forms[self._form_of[number]], numbers)
 
 
 @dataclass(frozen=True, slots=True)

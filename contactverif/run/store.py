@@ -7,7 +7,7 @@ stored outcomes count (`recheck_store`).
 import os
 import shlex
 from array import array
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby, product
 from pathlib import Path
@@ -17,16 +17,16 @@ from typing import IO, Any
 import msgspec
 import numpy as np
 
-from contactverif.contract import schema
-from contactverif.contract.case import Case
+from contactverif.contract.arrays import freeze
+from contactverif.contract.case import Case, CaseSummary
 from contactverif.contract.errors import MisuseError
-from contactverif.contract.property import Outcome, PropertyInfo, Verdict, judge_stored
+from contactverif.contract.property import Measurement, Outcome, PropertyInfo, Verdict, judge_stored
 from contactverif.plugins.provenance import CODE, machine
 from contactverif.plugins.registry import loads_file
 from contactverif.run.journal import RecordFile, decode, read_header, read_message, read_messages, record_files
 from contactverif.run.run_options import ISOLATION, PLACE, Isolation, RunOptions, group_names
 
-FORMAT = 5  # A change of a record is a new one.
+FORMAT = 6  # A change of a record is a new one.
 WITNESS = -1  # The number of the outcome of a row's witness.
 STORED = "stored_outcomes"  # The attribute of a report that says how many outcomes came from earlier processes.
 _MOST_FORMS = 10_000  # The most forms that a process remembers.
@@ -103,7 +103,7 @@ def check_versions(stored: Mapping[str, str], here: Mapping[str, str], argument:
 class FormRecord(msgspec.Struct, frozen=True, array_like=True, tag="form"):
     """The form of outcomes that stand behind it in the same file: their words and names."""
 
-    form: list[Any]
+    form: bytes
 
 
 class OutcomeRecord(msgspec.Struct, frozen=True, array_like=True, tag="outcome"):
@@ -122,14 +122,73 @@ class RejectedRecord(msgspec.Struct, frozen=True, array_like=True, tag="rejected
     files: tuple[str, ...]
 
 
+_PARTS = tuple[CaseSummary, str, str, Measurement | None, float, bool]  # The parts of an outcome that are stored.
 _ENCODER = msgspec.msgpack.Encoder()
 _DECODER: msgspec.msgpack.Decoder[Any] = msgspec.msgpack.Decoder(FormRecord | OutcomeRecord | RejectedRecord)
 
 
+def encode_outcome(outcome: Outcome) -> tuple[bytes, list[float]]:
+    """Return the form of an outcome, which many outcomes have in common, and its numbers.
+
+    The form is a message of MessagePack with all words of the outcome, and 0 or 0.0 in place of each number.
+    """
+    numbers: list[float] = []
+
+    def take(number: float) -> float:
+        numbers.append(float(number))
+        return 0 if isinstance(number, int) else 0.0
+
+    verdict, breach = outcome.verdict.name, bool(outcome.breach)
+    parts = outcome.summary, verdict, outcome.reason, outcome.measurement, outcome.seconds, breach
+    tree = _change_numbers(msgspec.to_builtins(parts, enc_hook=_plain), take)
+    try:
+        return _ENCODER.encode(tree), numbers
+    except UnicodeEncodeError:  # Words of a plugin may hold half of a character.
+        return _ENCODER.encode(_spell_out(tree)), numbers
+
+
+def decode_outcome(form: bytes, numbers: Iterable[float]) -> Outcome:
+    """Return the outcome of a form and numbers; a ValueError says that one of them is damaged."""
+    rest = iter(numbers)
+
+    def put(place: float) -> float:
+        number = next(rest)
+        return int(number) if isinstance(place, int) and number.is_integer() else number
+
+    try:
+        tree = _change_numbers(msgspec.msgpack.decode(form), put)
+        parts = msgspec.convert(tree, _PARTS, dec_hook=lambda _, values: freeze(values, np.float64))
+        outcome = Outcome(parts[0], Verdict[parts[1]], *parts[2:])
+    except (msgspec.MsgspecError, StopIteration, KeyError, TypeError, RecursionError) as error:
+        raise ValueError(f"form and numbers are not those of an outcome: {error}") from error
+    if next(rest, None) is not None:
+        raise ValueError("more numbers than the form of an outcome has")
+    return outcome
+
+
+def _change_numbers(item: Any, change: Callable[[float], float]) -> Any:
+    """Return lists and mappings, one in another, with each number changed."""
+    if isinstance(item, str | bool):
+        return item
+    if isinstance(item, int | float):
+        return change(item)
+    if isinstance(item, dict):
+        return {key: _change_numbers(value, change) for key, value in item.items()}
+    return [_change_numbers(each, change) for each in item] if isinstance(item, list | tuple) else item
+
+
 def _spell_out(item: Any) -> Any:
-    if isinstance(item, str):
-        return item.encode("utf-8", "backslashreplace").decode()
-    return tuple(map(_spell_out, item)) if isinstance(item, tuple) else item
+    if isinstance(item, dict):
+        return {_spell_out(key): _spell_out(value) for key, value in item.items()}
+    if isinstance(item, list):
+        return [_spell_out(each) for each in item]
+    return item.encode("utf-8", "backslashreplace").decode() if isinstance(item, str) else item
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, str):  # Words of a plugin may be of a type of its own.
+        return str.__str__(value)
+    return dict(value) if isinstance(value, Mapping) else np.asarray(value, dtype=np.float64).tolist()
 
 
 _files: dict[tuple[str, str, int], RecordFile] = {}  # The files into which this process writes.
@@ -156,15 +215,11 @@ class Writer:
 
     def add(self, place: int, outcome: Outcome) -> None:
         """Append the outcome of the case at a place behind the first."""
-        file, (form, numbers) = self.file, schema.encode(outcome)
+        file, (form, numbers) = self.file, encode_outcome(outcome)
         if form not in file.forms:
             if len(file.forms) >= _MOST_FORMS:
                 file.forms.clear()
-            try:
-                message = _ENCODER.encode(("form", form))
-            except UnicodeEncodeError:  # Words of a plugin may hold half of a character.
-                message = _ENCODER.encode(("form", _spell_out(form)))
-            byte = file.append(message)
+            byte = file.append(_ENCODER.encode(FormRecord(form)))
             if byte is None:
                 return
             file.forms[form] = byte
@@ -193,7 +248,7 @@ class Store:
         self._room = max(_LEAST_ROOM, 2 * (options.examples or 0)) + 1  # A case with a larger number is not believed.
         self._paths = [path for source in sources for path in record_files(source)]
         self.same_machine = all(_machine_of(source) == machine() for source in sources)
-        self._decoders: dict[tuple[int, int], Callable[[Any], Outcome]] = {}  # {(file, place of a form): …}
+        self._forms: dict[tuple[int, int], bytes] = {}  # {(file, place of a form): form}
         self._keys, self._places = self._read_places()
 
     def _read_places(self) -> tuple[Any, Any]:
@@ -260,14 +315,14 @@ class Store:
             return None
         key = file, record.form
         try:
-            if key not in self._decoders:
-                if len(self._decoders) >= _MOST_FORMS:
-                    self._decoders.clear()
+            if key not in self._forms:
+                if len(self._forms) >= _MOST_FORMS:
+                    self._forms.clear()
                 stored = _read_record(stream, record.form)
                 if not isinstance(stored, FormRecord):
                     return None
-                self._decoders[key] = schema.decoder(Outcome, stored.form)
-            outcome = judge_stored(info, self._decoders[key](array("d", record.numbers)))
+                self._forms[key] = stored.form
+            outcome = judge_stored(info, decode_outcome(self._forms[key], array("d", record.numbers)))
         except ValueError:  # They are damaged, do not belong together, or are of another property.
             return None
         return None if outcome.measurement is None and outcome.verdict is Verdict.PASS else outcome
