@@ -5,13 +5,14 @@ What comes back is checked here: whoever gets a `PlainMesh` may rely on every st
 
 import os
 from collections.abc import Collection
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
+from typing import Any
 
 import msgspec
 import numpy as np
 
-from contactverif.contract.arrays import FloatArray, IntArray
+from contactverif.contract.arrays import Array, FloatArray, IntArray
 from contactverif.contract.errors import MisuseError, one_line
 from contactverif.isolation.file_reader import ReadError, check_ordinary, limits_for, read_in_child
 from contactverif.isolation.wire import PackedArray
@@ -48,7 +49,7 @@ def read_mesh(path: str | os.PathLike[str]) -> PlainMesh:
     size = check_ordinary(path, "--mesh", "a mesh file").st_size
     try:
         packed = read_in_child("contactverif.meshes.read_file:pack_mesh", os.path.abspath(name), limits_for(size))
-        return _unpack(msgspec.msgpack.decode(packed, type=PackedMesh))
+        return _check_mesh(msgspec.msgpack.decode(packed, type=PlainMesh, dec_hook=_unpack))
     except ReadError as error:
         reason, _, needed = str(error).partition("; needed ")  # Our own readers say what is needed.
         raise MisuseError("--mesh", f"{name!r}, which cannot be read ({reason})", needed or _KNOWN_FILES) from error
@@ -56,35 +57,27 @@ def read_mesh(path: str | os.PathLike[str]) -> PlainMesh:
         raise MisuseError("--mesh", f"{name!r} with {error}", "a mesh whose parts fit each other") from error
 
 
-class PackedMesh(msgspec.Struct, array_like=True):
-    """A `PlainMesh` on its way from the child."""
-
-    points: PackedArray
-    cells: dict[str, PackedArray]
-    groups: dict[str, dict[str, PackedArray]]
-    pairs: list[tuple[str, str]]
-    materials: dict[str, tuple[float, float]]
-    warnings: str
+def _unpack(_: Any, packed: Any) -> Array:
+    return msgspec.convert(packed, PackedArray).unpack()
 
 
-def _unpack(stored: PackedMesh) -> PlainMesh:
-    points = stored.points.unpack()
+def _check_mesh(mesh: PlainMesh) -> PlainMesh:
+    points = mesh.points
     if points.ndim != 2 or points.shape[1] not in (2, 3) or points.dtype.kind not in "fiu":
         raise ValueError(f"points of type {points.dtype} and shape {points.shape}, not (n_points, 2 or 3)")
-    cells = {kind: _whole(kind, packed, len(points)) for kind, packed in stored.cells.items()}
+    cells = {kind: _whole(kind, data, len(points)) for kind, data in mesh.cells.items()}
     groups = {
-        name: {kind: _whole(kind, packed, len(points)) for kind, packed in parts.items()}
-        for name, parts in stored.groups.items()
+        name: {kind: _whole(kind, data, len(points)) for kind, data in group.items()}
+        for name, group in mesh.groups.items()
     }
     # Gmsh's format 2.2 has a cell once for each of its physical groups.
     cells = {
         kind: data[np.sort(np.unique(np.sort(data), axis=0, return_index=True)[1])] for kind, data in cells.items()
     }
-    return PlainMesh(points.astype(np.float64), cells, groups, tuple(stored.pairs), stored.materials, stored.warnings)
+    return replace(mesh, points=points.astype(np.float64), cells=cells, groups=groups)
 
 
-def _whole(kind: str, packed: PackedArray, n_points: int) -> IntArray:
-    data = packed.unpack()
+def _whole(kind: str, data: Array, n_points: int) -> IntArray:
     if data.ndim != 2 or data.dtype.kind not in "iu":
         raise ValueError(f"{kind} cells of type {data.dtype} and shape {data.shape}, not whole numbers in rows")
     if data.shape[1] != CORNERS.get(kind, data.shape[1]):

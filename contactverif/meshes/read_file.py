@@ -4,6 +4,7 @@ import gc
 import gzip
 import re
 from contextlib import redirect_stderr, redirect_stdout
+from dataclasses import replace
 from io import StringIO
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -19,7 +20,7 @@ from contactverif.isolation.wire import PackedArray
 from contactverif.meshes.deck import read_deck
 from contactverif.meshes.exodus import read_exodus
 from contactverif.meshes.mdpa import read_mdpa
-from contactverif.meshes.plain_mesh import Group, PackedMesh, PlainMesh
+from contactverif.meshes.plain_mesh import Group, PlainMesh
 
 # The cell data in which formats that number their groups store the numbers: `3` names a group. In any other array of
 # whole numbers `facet_tags=3` does.
@@ -36,20 +37,7 @@ def pack_mesh(path: str) -> bytes:
     gc.disable()  # This process ends with the file, and a deck makes millions of lists.
     with TemporaryDirectory() as folder:
         mesh = _read(_clean(Path(path), Path(folder)), path)
-    return msgspec.msgpack.encode(
-        PackedMesh(
-            PackedArray.pack(mesh.points, "points"),
-            _pack(mesh.cells),
-            {name: _pack(group) for name, group in mesh.groups.items()},
-            list(mesh.pairs),
-            mesh.materials,
-            mesh.warnings[:_LONGEST_WARNING],
-        )
-    )
-
-
-def _pack(group: Group) -> dict[str, PackedArray]:
-    return {kind: PackedArray.pack(data, kind) for kind, data in group.items()}
+    return msgspec.msgpack.encode(replace(mesh, warnings=mesh.warnings[:_LONGEST_WARNING]), enc_hook=PackedArray.pack)
 
 
 def _clean(path: Path, folder: Path) -> Path:

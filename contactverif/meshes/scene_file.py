@@ -21,12 +21,7 @@ from contactverif.mechanics.scene import Scene, pack_bodies, unpack_bodies
 
 OPTION = "--scene-file"
 _NEEDED = "FILE.py:FUNCTION, a function without arguments that returns a contactverif.Scene"
-
-
-class _PackedScene(msgspec.Struct, array_like=True):
-    bodies: dict[str, PackedArray]
-    facts: dict[str, PackedArray]
-    penalty: float
+_PackedScene = tuple[dict[str, PackedArray], dict[str, PackedArray], float]  # Its bodies, facts and penalty.
 
 
 def load_scene_file(text: str) -> Scene:
@@ -69,14 +64,9 @@ def pack_scene(text: str) -> bytes:
     scene = getattr(answer, "scene", answer)  # That of a `ProblemInstance`.
     if not isinstance(scene, Scene):
         raise ValueError(f"{name} returns {'nothing' if answer is None else f'a {type(answer).__name__}, no Scene'}")
-    bodies = pack_bodies(scene.bodies, scene.slave)
-    return msgspec.msgpack.encode(
-        _PackedScene(
-            {key: PackedArray.pack(values, key) for key, values in bodies.items()},
-            {key: PackedArray.pack(values, key) for key, values in scene.facts.items()},
-            float(scene.penalty),
-        )
-    )
+    parts = pack_bodies(scene.bodies, scene.slave), scene.facts
+    packed = [{key: PackedArray.pack(values, key) for key, values in part.items()} for part in parts]
+    return msgspec.msgpack.encode((*packed, float(scene.penalty)))
 
 
 def _call(path: str, name: str) -> Any:
@@ -102,16 +92,13 @@ def _call(path: str, name: str) -> Any:
 
 
 def _unpack(stored: _PackedScene) -> Scene:
-    packed = {key: values.unpack() for key, values in stored.bodies.items()}
-    facts = {key: np.asarray(values.unpack(), dtype=np.float64) for key, values in stored.facts.items()}
-    bodies, slave, master = unpack_bodies(packed)
-    scene = Scene(bodies, slave, master, stored.penalty, facts)
+    packed, packed_facts, penalty = stored
+    facts = {key: np.asarray(values.unpack(), dtype=np.float64) for key, values in packed_facts.items()}
+    bodies, slave, master = unpack_bodies({key: values.unpack() for key, values in packed.items()})
+    scene = Scene(bodies, slave, master, penalty, facts)
     if "compliance" in facts:  # Those of a uniform pressure, which no property could use otherwise
-        shapes: dict[str, tuple[int, ...]] = {
-            "compliance": (2,),
-            "along": (scene.interface.n_nodes,),
-            "direction": (2,),
-        }
+        along = (scene.interface.n_nodes,)
+        shapes: dict[str, tuple[int, ...]] = {"compliance": (2,), "along": along, "direction": (2,)}
         shapes["pressure" if "pressure" in facts else "approach"] = ()
         for name, shape in shapes.items():
             values = facts.get(name)
