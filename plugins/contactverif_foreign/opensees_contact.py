@@ -78,19 +78,9 @@ class OpenSeesContact:
 
 
 def opensees(*, penalty: float, kind: str) -> OpenSeesContact:
-    """Return a contact element of OpenSees, without friction.
+    """Return an element of OpenSees: "nts" (zeroLengthContactNTS2D) or "interface" (zeroLengthInterface2D).
 
-    Parameters
-    ----------
-    penalty : float
-        The normal stiffness Kn of a spring, a force per length.
-    kind : str
-        The element: "nts" (zeroLengthContactNTS2D) or "interface" (zeroLengthInterface2D).
-
-    Raises
-    ------
-    MisuseError
-        If there is no such element, or OpenSeesPy is not installed.
+    The penalty is the normal stiffness Kn of a spring, a force per length. There is no friction.
     """
     element = choose("kind", kind, _ELEMENTS)
     if find_spec("openseespy") is None:
