@@ -125,9 +125,6 @@ class RemoteEngineSubject(EngineSubject):
         super().__init__(engine.name, engine)
         self.remote = engine
 
-    def _call(self, scene: SceneArrays) -> EngineAnswer:
-        return self.remote.solve(scene)
-
 
 def _remote_of(subject: Subject) -> RemoteFactory | RemoteEngine | None:
     return subject.remote if isinstance(subject, RemoteSubject | RemoteEngineSubject) else None

@@ -23,6 +23,10 @@ from contactverif.isolation.wire import PackedArray
 MOST_EXPANSION, LEAST_ALLOWANCE = 1032, 1 << 20
 LONGEST_TEXT = 1 << 20  # Characters of an attribute. The longest that we write say what each formulation provides.
 _WORTH_COMPRESSING = 4096  # The bytes from which on a variable is compressed, which costs 2 kB of bookkeeping.
+# What the child sends: attributes, a variable, and all groups.
+_Attributes = dict[str, str | PackedArray]
+_PackedVariable = tuple[tuple[str, ...], PackedArray, _Attributes]
+_PackedGroups = dict[str, tuple[_Attributes, dict[str, _PackedVariable]]]
 _MAGIC = b"\x89HDF\r\n\x1a\n"  # The first bytes of each netCDF-4 file.
 
 
@@ -72,39 +76,28 @@ def read_groups(path: str | os.PathLike[str], argument: str, needed: str, *, dec
             raise MisuseError(argument, f"{name}, which {reason}", needed)
     try:
         packed = read_in_child(f"{__name__}:pack_groups", os.path.abspath(name), limits_for(size))
-        groups = msgspec.msgpack.decode(packed, type=dict[str, _PackedGroup])
-        return {path: group.unpack(decode=decode) for path, group in groups.items()}
+        groups = {}
+        for path_of_group, (attributes, packed_variables) in msgspec.msgpack.decode(packed, type=_PackedGroups).items():
+            variables = {key: _unpack_variable(*parts, decode) for key, parts in packed_variables.items()}
+            groups[path_of_group] = Group(variables, _unpack_attributes(attributes))
+        return groups
     except (ReadError, msgspec.DecodeError, ValueError) as error:
         reason = " ".join(str(error).split())
         raise MisuseError(argument, f"{name}, which is damaged ({reason})", needed) from error
 
 
-class _PackedVariable(msgspec.Struct, array_like=True):
-    dims: tuple[str, ...]
-    values: PackedArray
-    attrs: dict[str, str | PackedArray]
-
-    def unpack(self, *, decode: bool) -> Variable:
-        values, dims = self.values.unpack(), self.dims
-        if decode and values.dtype.kind == "S":  # Characters (..., width) become words (...,).
-            *shape, width = values.shape
-            joined = values.view(f"S{width * values.itemsize}").reshape(shape) if values.size else np.zeros(shape, "S1")
-            values, dims = np.strings.decode(joined, "utf-8"), dims[:-1]
-        if len(dims) != values.ndim:
-            raise ValueError(f"{len(dims)} dimensions of an array of shape {values.shape}")
-        return Variable(dims, values, _unpack_attributes(self.attrs))
+def _unpack_variable(dims: tuple[str, ...], packed: PackedArray, attributes: _Attributes, decode: bool) -> Variable:
+    values = packed.unpack()
+    if decode and values.dtype.kind == "S":  # Characters (..., width) become words (...,).
+        *shape, width = values.shape
+        joined = values.view(f"S{width * values.itemsize}").reshape(shape) if values.size else np.zeros(shape, "S1")
+        values, dims = np.strings.decode(joined, "utf-8"), dims[:-1]
+    if len(dims) != values.ndim:
+        raise ValueError(f"{len(dims)} dimensions of an array of shape {values.shape}")
+    return Variable(dims, values, _unpack_attributes(attributes))
 
 
-class _PackedGroup(msgspec.Struct, array_like=True):
-    attrs: dict[str, str | PackedArray]
-    variables: dict[str, _PackedVariable]
-
-    def unpack(self, *, decode: bool) -> Group:
-        variables = {name: variable.unpack(decode=decode) for name, variable in self.variables.items()}
-        return Group(variables, _unpack_attributes(self.attrs))
-
-
-def _unpack_attributes(attributes: Mapping[str, str | PackedArray]) -> dict[str, Any]:
+def _unpack_attributes(attributes: _Attributes) -> dict[str, Any]:
     values = {name: value if isinstance(value, str) else value.unpack() for name, value in attributes.items()}
     return {name: value if isinstance(value, str) or value.ndim else value[()] for name, value in values.items()}
 
@@ -120,10 +113,10 @@ def pack_groups(path: str) -> bytes:
     packed = {}
     for name, group in groups.items():
         variables = {
-            key: _PackedVariable(tuple(each.dimensions), PackedArray.pack(each[...], key), _pack_attributes(each))
+            key: (tuple(each.dimensions), PackedArray.pack(each[...], key), _pack_attributes(each))
             for key, each in group.variables.items()
         }
-        packed[name] = _PackedGroup(_pack_attributes(group), variables)
+        packed[name] = _pack_attributes(group), variables
     return msgspec.msgpack.encode(packed)
 
 
@@ -149,8 +142,8 @@ def _check_sizes(groups: Mapping[str, Any], size: int) -> None:
                 raise ValueError(f"with {place} of shape {variable.shape} it holds more than {size} bytes can")
 
 
-def _pack_attributes(owner: Any) -> dict[str, str | PackedArray]:
-    attributes: dict[str, str | PackedArray] = {}
+def _pack_attributes(owner: Any) -> _Attributes:
+    attributes: _Attributes = {}
     for name in owner.ncattrs():
         value = owner.getncattr(name)
         if isinstance(value, list):  # Of strings.
