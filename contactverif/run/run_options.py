@@ -85,8 +85,8 @@ class Option:
     metavar: str | None = None
     flags: tuple[str, ...] = ()  # Empty for `--NAME` alone.
     group: str = ""  # Options that a command takes together.
-    setting: str = ""  # Its name in the table of settings; empty if there is none.
-    needed: str = ""  # What an error says that the setting needs.
+    setting: str = ""  # Its name in the table of settings; empty if it is that of the option.
+    needed: str = ""  # What an error says that the setting needs; empty if there is no setting.
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -112,19 +112,12 @@ class RunOptions:
             "Check only the properties whose id matches, or those of a family. Repeatable.",
             "GLOB",
             ("--property", "-p"),
-            setting="properties",
             needed="a list of patterns",
         ),
     ] = ()
     examples: Annotated[
         int | None,
-        Option(
-            "Number of random cases of each property.",
-            "N",
-            group=SAMPLING,
-            setting="examples",
-            needed="a whole number",
-        ),
+        Option("Number of random cases of each property.", "N", group=SAMPLING, needed="a whole number"),
     ] = None
     seed: Annotated[int | None, Option("The same seed gives the same cases.", "N", group=SAMPLING)] = None
     profile: Annotated[
@@ -134,7 +127,6 @@ class RunOptions:
             "nightly: 2000 cases, new ones in every run. (default: dev)",
             "NAME",
             group=SAMPLING,
-            setting="profile",
             needed="the name of a profile",
         ),
     ] = None
@@ -159,10 +151,7 @@ class RunOptions:
     known: Annotated[  # {property: why its failure is known}
         dict[str, str],
         Option(
-            "A known failure, with its reason. Repeatable.",
-            "ID=REASON",
-            setting="known",
-            needed="a table of properties and reasons",
+            "A known failure, with its reason. Repeatable.", "ID=REASON", needed="a table of properties and reasons"
         ),
     ] = field(default_factory=dict)
     keep_going: Annotated[
@@ -186,7 +175,6 @@ class RunOptions:
         Option(
             "Neither ask first what failed in earlier runs, nor keep what fails now.",
             flags=("--no-memory",),
-            setting="memory",
             needed="true or false",
         ),
     ] = True
@@ -235,7 +223,6 @@ class RunOptions:
             "(default: one for each 1000 planned cases, at most one for each core)",
             "N",
             ("--jobs", "-j"),
-            setting="jobs",
             needed="a whole number",
         ),
     ] = None
@@ -247,7 +234,6 @@ class RunOptions:
             "where it can be had and a box cannot. process: without either. inline: in this process, for debugging.",
             "WHERE",
             group=ISOLATION,
-            setting="isolation",
             needed="box, landlock, process or inline",
         ),
     ] = None
@@ -395,7 +381,8 @@ def group_names(name: str) -> list[str]:
 
 @cache
 def _settings() -> dict[str, str]:
-    return {option.setting: name for name, (_, option) in declared_options(RunOptions).items() if option.setting}
+    options = declared_options(RunOptions)
+    return {option.setting or name: name for name, (_, option) in options.items() if option.needed}
 
 
 def read_settings() -> RunOptions:
