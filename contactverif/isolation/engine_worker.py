@@ -69,7 +69,8 @@ def main(make: Callable[[], Any]) -> None:
 
 
 def _solve(engine: Any, question: int, arrays: dict[str, Any]) -> list[Any]:
-    scene = SceneArrays.from_arrays({name: _unpack(*packed) for name, packed in arrays.items()})
+    unpacked = {name: np.frombuffer(data, dtype).reshape(shape) for name, (dtype, shape, data) in arrays.items()}
+    scene = SceneArrays.from_arrays(unpacked)
     start = perf_counter()
     answer: EngineAnswer = engine.solve(scene)
     seconds = perf_counter() - start
@@ -82,10 +83,6 @@ def _solve(engine: Any, question: int, arrays: dict[str, Any]) -> list[Any]:
 def _pack(array: Any) -> list[Any]:
     plain = np.asarray(array)
     return [plain.dtype.str, list(plain.shape), plain.tobytes()]
-
-
-def _unpack(dtype: str, shape: list[int], data: bytes) -> Any:
-    return np.frombuffer(data, dtype).reshape(shape)
 
 
 def _words(error: BaseException) -> str:

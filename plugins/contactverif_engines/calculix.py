@@ -138,7 +138,7 @@ def write_deck(layer: Layer, kind: Kind) -> list[str]:
     stiffness = _number(scene.penalty) + (f", {_number(tension)}" if kind == "nodes" else "")
     return [
         "*NODE, NSET=ALL",
-        *_rows(layer.nodes),
+        *(", ".join([str(n), *map(_number, node)]) for n, node in enumerate(layer.nodes.tolist(), start=1)),
         *_elements_and_surfaces(layer),
         *_materials(layer),
         *_turned_nodes(layer),
@@ -208,10 +208,6 @@ def _turned_nodes(layer: Layer) -> list[str]:
         frame = np.pad(axis.reshape(dim, dim), ((0, 3 - dim), (0, 0)))
         lines.append(", ".join(map(_number, frame[:, :2].T.reshape(-1))))
     return lines
-
-
-def _rows(nodes: FloatArray) -> list[str]:
-    return [", ".join([str(index), *map(_number, node)]) for index, node in enumerate(nodes.tolist(), start=1)]
 
 
 def _number(value: float) -> str:
