@@ -117,10 +117,7 @@ class Bar:
     def update(self, description: str, n_finished: int, n_planned: int | None, left: str = "") -> None:
         """Show how many of the planned steps are finished, if that is known, what comes next, and the time left.
 
-        Raises
-        ------
-        KeyboardInterrupt
-            If the user has pressed Ctrl-C, or the system has sent SIGTERM; it has the number of the signal.
+        After Ctrl-C, or SIGTERM from the system, it raises a KeyboardInterrupt with the number of the signal.
         """
         if stop_signals:
             raise KeyboardInterrupt(stop_signals[0])

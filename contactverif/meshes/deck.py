@@ -349,12 +349,8 @@ def read_deck(path: str, place: str) -> PlainMesh:
     """Read an input deck of Abaqus or CalculiX; it may include files of its `place`, where it may lie compressed.
 
     Groups are surfaces and sets. One of an instance is ``INSTANCE.NAME``, and ``NAME`` if no other instance has that
-    name. A set with the name of a surface ends with "(ELSET)" or "(NSET)".
-
-    Raises
-    ------
-    ValueError
-        If the deck cannot be read. Lines are counted with included files in their places.
+    name. A set with the name of a surface ends with "(ELSET)" or "(NSET)". A ValueError says why the deck cannot be
+    read; its lines are counted with included files in their places.
     """
     deck = _Deck(_expand(path, [place]))
     _Card("ELEMENT", {}, "", 1).need(bool(deck.elements), "no elements; needed a deck with *NODE and *ELEMENT")

@@ -90,14 +90,9 @@ def run(
     `progress` is called after every case, with an executor after every job. The executor may be any whose workers are
     processes, such as one of loky or dask; None for this process. The results are the same but for seconds.
 
-    Raises
-    ------
-    MisuseError
-        If a known failure names no property of this run, a name stands there twice, or `shrink` is another word.
-    WorkerError
-        If a worker process dies.
-    RunStopped
-        If the user presses Ctrl-C. It is a `KeyboardInterrupt` with the rows as far as they are judged.
+    A MisuseError says that a known failure names no property of this run, a name stands there twice, or `shrink` is
+    another word, and a WorkerError that a worker process died. If the user presses Ctrl-C, it is a `RunStopped`: a
+    `KeyboardInterrupt` with the rows as far as they are judged.
     """
     check_known(known or {}, properties)
     if shrink not in get_args(Shrink):
