@@ -140,11 +140,13 @@ class EggMesh(NamedTuple):
     name: str
     upper: tuple[int, int] = (4, 3)
     lower: tuple[int, int] = (3, 4)
-    skew: float = 0.0  # By how much of a side nodes inside are moved along both axes, to and fro
+    skew: float = (
+        0.0  # By how much of a side nodes inside are moved along both axes, to and fro; no waves if it is not 0
+    )
 
 
-REGULAR, FINER = EggMesh(""), EggMesh(", 3 times finer", (3, 3), (9, 10))
-EGG_MESHES = REGULAR, EggMesh(", skewed", skew=0.2), FINER
+EGG_MESHES = EggMesh(""), EggMesh(", skewed, no waves", skew=0.2), EggMesh(", 3 times finer", (3, 3), (9, 10))
+REGULAR, SKEWED, FINER = EGG_MESHES
 
 
 @dataclass(frozen=True, slots=True)
@@ -184,8 +186,9 @@ class EggBox:
     def pose(self, refine: int, traits: Traits) -> ProblemInstance:
         """Return the problem on its mesh, refined by r."""
         penalty = inf if traits.rules.enforcement == "multiplier" else self.stiffness
-        amplitude = self.amplitude(penalty)
-        mean, scene = self.load * amplitude, _egg_box(self, refine, penalty)
+        wave = self.amplitude(penalty)
+        amplitude = 0.0 if self.mesh.skew else wave
+        mean, scene = self.load * wave, _egg_box(self, refine, penalty)
         interface, upper = scene.interface, int(not self.upper_slave)
 
         def pressure(places: FloatArray) -> FloatArray:
@@ -200,7 +203,7 @@ class EggBox:
             return np.add(*(traction_forces(side, flat, partial(traction, sign)) for side, sign in sides))
 
         return ProblemInstance(
-            scene=scene, forces=forces, pressure=pressure, pressure_scale=amplitude, deformed=False,
+            scene=scene, forces=forces, pressure=pressure, pressure_scale=wave, deformed=False,
             step=(mean - amplitude) / self.stiffness / 16,
         )  # fmt: skip
 
@@ -223,7 +226,8 @@ def _egg_box(box: EggBox, refine: int, penalty: float) -> Scene:
         grids.append((points + box.mesh.skew * signs * inside * [x[1], y[1]], faces))
     (slave, below), (master, above) = grids
     nodes = [np.column_stack([points, np.zeros(len(points))]) for points in (slave, master)]
-    nodes[0][:, 2] = -box.wave * box.cosines(nodes[0])
+    if not box.mesh.skew:
+        nodes[0][:, 2] = -box.wave * box.cosines(nodes[0])
     interface = Interface.from_faces(nodes[0], below[:, ::-1], nodes[1], above)
     mean = box.load * box.amplitude(penalty)
     moduli = (e * (1 - v) / ((1 + v) * (1 - 2 * v)) for e, v in zip(box.young, box.poisson, strict=True))

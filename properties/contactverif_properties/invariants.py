@@ -523,8 +523,8 @@ def units(case: Case, subject: Subject) -> Measurement:
     max|K|. The tolerance is u(8Z/min(g, ℓ) + 4N), where Z is the diameter of a formulation that promises
     `translation_stable`, and the largest coordinate of any other. Powers of two scale the four operations and square
     roots exactly, so a formulation that uses nothing else gives 0; a power or an angle is rounded anew. A multiplier
-    stays the same if it is a pressure, and scales if it is a nodal force. Of a formulation with multipliers only the
-    position rows are compared.
+    stays the same if it is a pressure, in space it becomes 2^−k times as large, and it scales if it is a nodal force.
+    Of a formulation with multipliers only the position rows are compared.
 
     **Undecided.** A failing case is undecided where the state lies at a kink, or where moving the nodes by 64 u X
     changes the answer by a quarter of the error or more.
@@ -534,7 +534,8 @@ def units(case: Case, subject: Subject) -> Measurement:
     distributed = subject.traits.rules.penalty == "distributed"
     state = freeze_state(case, subject)
     case, z = state.case, state.case.z
-    z_there = np.concatenate([z[:n] * factor, z[n:] * (1.0 if distributed else factor)])
+    # Forces grow with lengths here, so that a pressure on faces falls with them.
+    z_there = np.concatenate([z[:n] * factor, z[n:] * factor ** (2 - dim if distributed else 1)])
     case_there = replace(case, interface=interface.at(interface.nodes * factor), z=z_there)
     penalty = 1.0 if case.n_multipliers else subject.penalty(case)
     # The power of a length in the penalty, so that forces grow with lengths and the tangent stays.
