@@ -33,10 +33,10 @@ from contactverif.contract.interface import QUADRILATERAL, TRIANGLE, Interface, 
 from contactverif.geometry.block_rows import Fields
 from contactverif_surfaces.face_search import (
     MOST_CORNERS,
-    TIE,
     Tree,
     clip_face,
     collect_boxes,
+    holds_points,
     may_overlap,
     measure_distance,
     set_axes,
@@ -346,7 +346,7 @@ def _find_patches(out: Fields, rooms: Fields, x: FloatArray, surfaces: Fields, r
         set_shapes(shapes, slopes, on_master, centre[0], centre[1])
         active[p] = centre[2] - combine(on_master, shapes)[2] < 0
         set_corners(part, face, shares)
-        inside = _holds_part(on_master, part, measure_distance(origin))
+        inside = holds_points(on_master, part, measure_distance(origin))
         if not active[p] or (inside and on_triangles):
             continue
         for axis in range(2):
@@ -418,19 +418,3 @@ def _is_free(neighbours: IntArray, free: BoolArray, face: IntArray, site: int) -
     if site == INSIDE:
         return False
     return bool(neighbours[site] < 0 if site < len(face) else free[face[site - len(face)]])
-
-
-@compile_part
-def _holds_part(face: FloatArray, part: FloatArray, size: float) -> bool:
-    """Return whether all of a part lies on a face, or past an edge of it by roundoff of this size at least."""
-    for corners in (face, part):
-        for i in range(len(corners)):
-            size = max(size, abs(corners[i, 0]), abs(corners[i, 1]))
-    for j in range(len(face)):
-        k = (j + 1) % len(face)
-        along, across = face[k, 0] - face[j, 0], face[k, 1] - face[j, 1]
-        width = TIE * size * np.sqrt(along * along + across * across)
-        for i in range(len(part)):
-            if along * (part[i, 1] - face[j, 1]) - across * (part[i, 0] - face[j, 0]) < -width:
-                return False
-    return True

@@ -4,8 +4,8 @@ A slave face and a master face make a cell where, seen along the slave's normal,
 
 1. they face each other: the master's corners run the other way round;
 2. they overlap: the master face, clipped by the edges of the slave face, keeps at least three corners;
-3. no other master face of these is nearer in the middle of the cell. So of bodies one behind the other only the nearest
-   is touched;
+3. no other master face of these is nearer in the middle of the cell; a middle on the edge of a face is on it. So of
+   bodies one behind the other only the nearest is touched;
 4. the gap there is at most 2 (h_s + h_m) either way, h the longest edge of the connected part of the surface. A deeper
    penetration is no contact, and neither is a body at the back of the slave's (our choice, as in the plane).
 
@@ -339,9 +339,9 @@ def _drop_hidden(faces: IntArray, corners: IntArray, first: int, count: int, tab
     for other in range(first, count):
         view_face(on_master, x, master[faces[other, 1]], origin, axes, True)
         for cell in range(first, count):
-            row = table[cell - first]
+            row, middle = table[cell - first], table[cell - first : cell - first + 1]
             x_m, y_m = row[MIDDLE_X], row[MIDDLE_Y]
-            if other == cell or not _holds_place(on_master, x_m, y_m):
+            if other == cell or not holds_points(on_master, middle, measure_distance(origin)):
                 continue
             if abs(_height_at(table[other - first], x_m, y_m)) < abs(_height_at(row, x_m, y_m)):
                 faces[cell, 0] = -1
@@ -354,12 +354,21 @@ def _drop_hidden(faces: IntArray, corners: IntArray, first: int, count: int, tab
 
 
 @compile_part
-def _holds_place(face: FloatArray, x: float, y: float) -> bool:
+def holds_points(face: FloatArray, points: FloatArray, size: float) -> bool:
+    """Return whether all points lie on a face, seen along an axis, or past an edge of it by no more than a tie.
+
+    The size is the distance at which positions are rounded.
+    """
+    for corners in (face, points):
+        for i in range(len(corners)):
+            size = max(size, abs(corners[i, 0]), abs(corners[i, 1]))
     for j in range(len(face)):
         k = (j + 1) % len(face)
         along, across = face[k, 0] - face[j, 0], face[k, 1] - face[j, 1]
-        if along * (y - face[j, 1]) - across * (x - face[j, 0]) <= 0:
-            return False
+        width = TIE * size * np.sqrt(along * along + across * across)
+        for i in range(len(points)):
+            if along * (points[i, 1] - face[j, 1]) - across * (points[i, 0] - face[j, 0]) < -width:
+                return False
     return True
 
 
