@@ -1,4 +1,4 @@
-"""Methods in three dimensions: springs at Gauss points of cells, mortar, virtual slave nodes in parts of faces, nodes.
+"""Methods in three dimensions: springs at Gauss points of cells, mortar, nodes.
 
 Springs: a point has the pressure −ε̂ g where g < 0, along the slave's normal, and pushes both faces by their shape
 functions there. So force and moment balance point by point, and a uniform pressure is integrated exactly over what is
@@ -7,11 +7,6 @@ covered.
 Mortar: the gap of slave node i is G_i / W_i with G_i = ∫ N_i g and W_i = ∫ N_i over what the master covers. Its
 pressure −ε̂ G_i / W_i, where that is above 0, acts with the same shape function. So a uniform pressure is exact, and
 force and moment balance at each point of the integrals.
-
-Quarters (ours; `face_ppt` is the method of the paper): a virtual slave node at the centre of each of four parts of a
-slave face has the gap to the master face opposite, along the slave's normal. It presses its part of the slave by the
-shape functions at the node. The same pressure acts on every master face under the part, integrated with the master's
-shape functions. On triangles both sides balance where the master covers the part; on warped quadrilaterals they do not.
 
 Nodes: a spring at each slave node acts along the normal of the nearest master face (`face_ppt_search`), if the gap is
 at most 2 (h_s + h_m) either way, as for cells (`face_search`). The foot is straight below the node, past the edge of
@@ -50,8 +45,8 @@ from contactverif_surfaces.cell_points import (
     report_points,
     unknowns_of,
 )
-from contactverif_surfaces.face_ppt_search import N_PARTS, PARTS, find_nearest_faces
-from contactverif_surfaces.face_search import REACH, find_cells, longest_edges
+from contactverif_surfaces.face_ppt_search import find_nearest_faces
+from contactverif_surfaces.face_search import REACH, longest_edges
 
 PointRule = Callable[[SlaveView, IntArray], CellPoints]  # It takes the view and the codes of cells.
 N_POINTS = 6  # Gauss points a triangle of the mortar method: a gap × two shape functions has degree 3.
@@ -215,140 +210,6 @@ def mortar_3d(*, penalty: float) -> SurfaceMortar:
     source = "Puso & Laursen, Comput. Methods Appl. Mech. Engrg. 193 (2004) 601–629; the slave's normal: here"
     shapes = {"gap_shapes": "standard", "pressure_shapes": "standard"}
     return SurfaceMortar(SURFACE_TRAITS.revise(faces=(3, 4), source=source, **shapes), check_penalty(penalty))
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class FaceQuarters:
-    """The formulation: pressure −ε̂ g of each part of a slave face, where the gap g at its centre is below 0."""
-
-    traits: Traits
-    penalty: float  # Distributed stiffness ε̂.
-
-    def pair(self, interface: Interface, z: FloatArray, /) -> Pairing:
-        """Find the cells of the parts, the master face under each centre (`home`), and the parts in contact."""
-        slave, master, x = interface.slave.faces, interface.master, np.array(z).reshape(-1, 3)
-        x = x - x[0]  # The middle of an edge is rounded at its distance from the origin.
-        corners = np.einsum("pci,fij->fpcj", PARTS[slave.shape[1]], x[slave]).reshape(-1, slave.shape[1], 3)
-        numbers = np.arange(corners.shape[0] * corners.shape[1]).reshape(corners.shape[:2])
-        edges = np.repeat(longest_edges(interface.slave, x), N_PARTS), longest_edges(master, x)
-        faces, codes = find_cells(np.vstack([corners.reshape(-1, 3), x]), numbers, master.faces + numbers.size, *edges)
-        view = SlaveView.of_corners(corners[faces[:, 0]], x[master.faces[faces[:, 1]]])
-        depth = evaluate_shapes(view.master, view.slave.mean(axis=1, keepdims=True))[:, 0].min(axis=1)
-        home, deepest = np.full(len(corners), -1), np.full(len(corners), -PAST_BORDER)
-        for (part, face), value in zip(faces.tolist(), depth.tolist(), strict=True):
-            if value > deepest[part]:
-                home[part], deepest[part] = face, value
-        parts, active = np.flatnonzero(home >= 0), np.zeros(len(home), bool)
-        shares, nodes = _parts_on_faces(interface, parts, home[parts])
-        active[parts] = _centre_points(positions_of(z, nodes), shares).gap[:, 0] < 0
-        return Pairing(
-            {"part": faces[:, 0], "master_face": faces[:, 1], "corners": codes, "home": home, "active": active}
-        )
-
-    def residual(self, interface: Interface, pairing: Pairing, z: Array, /) -> Array:
-        """Compute the forces (..., n_unknowns)."""
-        (shares, nodes), (cell_shares, cell_nodes), codes, part_of_cell = _in_contact(interface, pairing)
-        n_slave, corners = shares.shape[-1], positions_of(z, nodes)
-        on_slave, pressure = self._press_slave(corners, shares), self._pressure(corners, shares)[..., 0]
-        on_master = _unit_master(positions_of(z, cell_nodes), cell_shares, codes) * pressure[..., part_of_cell, None]
-        forces = add_rows(on_slave, unknowns_of(nodes[:, :n_slave]), z.shape[-1])
-        return forces + add_rows(on_master, unknowns_of(cell_nodes[:, n_slave:]), z.shape[-1])
-
-    def tangent(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> sparse.csr_array:
-        """Compute the derivative of the residual: on the slave, and on the master at fixed pressures and by these."""
-        (shares, nodes), (cell_shares, cell_nodes), codes, part_of_cell = _in_contact(interface, pairing)
-        n, n_slave = interface.n_unknowns, shares.shape[-1]
-        at_centres, at_cells = positions_of(z, nodes), positions_of(z, cell_nodes)
-        pressure, by_nodes = self._pressure(at_centres, shares)[..., 0], unknowns_of(nodes)
-        on_slave = differentiate(self._press_slave, at_centres, shares)
-        fixed = differentiate(_unit_master, at_cells, cell_shares, codes) * pressure[part_of_cell, None, None]
-        units = _unit_master(at_cells, cell_shares, codes)[..., None]
-        slopes, rows = differentiate(self._pressure, at_centres, shares), unknowns_of(cell_nodes[:, n_slave:])
-        by_pressure = add_blocks(units, rows, part_of_cell[:, None], (n, len(pressure)))
-        of_pressure = add_blocks(slopes, np.arange(len(pressure))[:, None], by_nodes, (len(pressure), n))
-        direct = add_blocks(on_slave, unknowns_of(nodes[:, :n_slave]), by_nodes, (n, n))
-        on_master = add_blocks(fixed, rows, unknowns_of(cell_nodes), (n, n))
-        return sparse.csr_array(direct + on_master + by_pressure @ of_pressure)
-
-    def contact_points(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> ContactPoints:
-        """Return the centres of all parts that have a master face under them."""
-        parts = np.flatnonzero(pairing["home"] >= 0)
-        home, active = pairing["home"][parts], pairing["active"][parts]
-        shares, nodes = _parts_on_faces(interface, parts, home)
-        corners = positions_of(z, nodes)
-        points, slave = _centre_points(corners, shares), corners[:, : shares.shape[-1]]
-        return ContactPoints.on_faces(
-            slave_segment=parts // N_PARTS,
-            slave_shape=points.slave_shape[:, 0],
-            master_segment=home,
-            master_shape=points.master_shape[:, 0],
-            position=(points.slave_shape[:, 0, :, None] * slave).sum(axis=1),
-            normal=-points.normal,
-            gap=points.gap[:, 0],
-            pressure=np.where(active, -self.penalty * points.gap[:, 0], 0.0),
-            weight=points.weight[:, 0],
-            active=active,
-        )
-
-    def _press_slave(self, corners: Array, shares: FloatArray) -> Array:
-        """Return the residuals (..., n, n_slave_corners · 3) of pressures −ε̂ g on the slave faces of parts."""
-        points = _centre_points(corners, shares)
-        return flatten_pushes(points.push(-self.penalty * points.gap * points.weight)[0])
-
-    def _pressure(self, corners: Array, shares: FloatArray) -> Array:
-        return -self.penalty * _centre_points(corners, shares).gap
-
-
-def _parts_on_faces(interface: Interface, parts: IntArray, master: IntArray) -> tuple[FloatArray, IntArray]:
-    """Return for parts (n,), numbered through all slave faces, and master faces (n,) two arrays.
-
-    The corners of each part as shares of those of its face, (n, corners of a part, n_slave_corners), and the nodes of
-    the slave face, then of the master face (n, n_corners).
-    """
-    slave = interface.slave.faces[parts // N_PARTS]
-    nodes = np.concatenate([slave, interface.master.faces[master]], axis=1)
-    return PARTS[slave.shape[1]][parts % N_PARTS], nodes
-
-
-def _in_contact(
-    interface: Interface, pairing: Pairing
-) -> tuple[tuple[FloatArray, IntArray], tuple[FloatArray, IntArray], IntArray, IntArray]:
-    """Return the parts in contact, the same for each of their cells, the codes of the cells, and their parts' numbers.
-
-    A part has the master face under its centre, a cell its own. The numbers count parts in contact.
-    """
-    active = pairing["active"]
-    parts, in_contact = np.flatnonzero(active), active[pairing["part"]]
-    part, master, codes = (pairing[name][in_contact] for name in ("part", "master_face", "corners"))
-    centres = _parts_on_faces(interface, parts, pairing["home"][parts])
-    return centres, _parts_on_faces(interface, part, master), codes, np.searchsorted(parts, part)
-
-
-def _centre_points(corners: Array, shares: FloatArray) -> CellPoints:
-    """Return the centres of parts with face corners (..., n, n_corners, 3), and the areas of the parts."""
-    n_slave = shares.shape[-1]
-    view = SlaveView.of_corners(corners[..., :n_slave, :], corners[..., n_slave:, :])
-    places = np.einsum("npk,...nkd->...npd", shares, view.slave)
-    return view.points_at(places.mean(axis=-2, keepdims=True), plane_areas(places)[..., None])
-
-
-def _unit_master(corners: Array, shares: FloatArray, codes: IntArray) -> Array:
-    """Return the residuals (..., n, n_master_corners · 3) of a unit pressure on the master faces of cells."""
-    n_slave, corners = shares.shape[-1], corners - corners[..., :1, :]
-    part = np.einsum("npk,...nkd->...npd", shares, corners[..., :n_slave, :])
-    view = SlaveView.of_corners(part, corners[..., n_slave:, :])
-    points = gauss_points(view, codes, 3 if n_slave == TRIANGLE else 6)
-    return flatten_pushes(points.push(points.weight)[1])
-
-
-def press_along_slave(penalty: float) -> FaceQuarters:
-    """Return `vts_ppt_3d` with everything along the slave's normal (ours)."""
-    # A part that overhangs the master presses the slave with all its area, and the master with what is covered.
-    witnesses = {**SURFACE_TRAITS.evidence.witnesses, "balance": "tilted-faces"}
-    traits = SURFACE_TRAITS.revise(
-        gap="slave normal", conserves_force=False, conserves_moment=False, witnesses=witnesses, source="here"
-    )
-    return FaceQuarters(traits, check_penalty(penalty))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

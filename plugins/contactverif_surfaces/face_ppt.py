@@ -9,6 +9,9 @@ Otherwise each face j carries W_jk = ∫ N_k over its overlap with the part, in 
 
     printed: master nodes get −ε̂ g W_jk n          balanced (ours), or m alone: −F W_jk/S n
 
+Along the slave's normal (ours) n is that of the slave face, turned round, m is the face straight below V, and master
+nodes get −ε̂ g W_jk n. On triangles F is all of it where the master covers the part.
+
 Over a triangle N_k is linear, and the integral exact. On a quadrilateral it has 6 Gauss points on each triangle between
 the middle of the cell and two corners, as `cell_points.gauss_points`.
 
@@ -52,13 +55,13 @@ from contactverif.geometry.block_rows import (
     zero_matrix,
 )
 from contactverif_surfaces.cell_points import GAUSS, SURFACE_TRAITS
-from contactverif_surfaces.face_methods import FaceQuarters, press_along_slave
 from contactverif_surfaces.face_ppt_search import (
     N_PARTS,
     TABLES,
     combine,
     cross,
     dot,
+    find_opposite_faces,
     find_patches,
     place_part,
     set_corners,
@@ -96,13 +99,17 @@ def _cross_plane(a_s: float, a_t: float, b_s: float, b_t: float) -> float:
 
 
 @compile_part
-def _place_node(of_part: Fields, x: Array, slave: IntArray, home: IntArray, table: Fields, k: int) -> Fields:
-    """Write part k of a slave face with its partner; return A, V in the axes of m from the slave's first corner, and g.
+def _place_node(
+    of_part: Fields, x: Array, slave: IntArray, home: IntArray, table: Fields, k: int, along_slave: bool
+) -> Fields:
+    """Write part k of a slave face with its partner; return A, V along the axes from the slave's first corner, and g.
 
     All decisions were made on the same numbers (`face_ppt_search`).
     """
     axes, on_slave, on_home, part, mean, shapes, slopes = of_part[:7]
-    set_axes(axes, x, home)
+    set_axes(axes, x, slave if along_slave else home)
+    for axis in range(3 if along_slave else 0):  # n points out of the master.
+        axes[1, axis], axes[2, axis] = -axes[1, axis], -axes[2, axis]
     view_face(on_slave, x, slave, x[slave[0]], axes, False)
     view_face(on_home, x, home, x[slave[0]], axes, False)
     area, centre = place_part(mean, on_slave, table, k)
@@ -113,13 +120,13 @@ def _place_node(of_part: Fields, x: Array, slave: IntArray, home: IntArray, tabl
 
 @compile_kernel
 def _write_nodes(
-    written: FloatArray, of_part: Fields, x: FloatArray, faces: Fields, parts: IntArray, home: IntArray, table: Fields
+    written: FloatArray, of_part: Fields, x: FloatArray, faces: Fields, parts: IntArray, home: IntArray, rules: Fields
 ) -> None:
     """Write area, gap, normal, V − x_0, N̄ and M of parts (n, 8 + n_slave_corners + n_master_corners)."""
-    (slave, master), axes = faces, of_part[0]
+    (slave, master), (table, _, _, along_slave, _), axes = faces, rules, of_part[0]
     for i in range(len(parts)):
         face = slave[parts[i] // N_PARTS]
-        area, centre, gap = _place_node(of_part, x, face, master[home[i]], table, parts[i] % N_PARTS)
+        area, centre, gap = _place_node(of_part, x, face, master[home[i]], table, parts[i] % N_PARTS, along_slave)
         written[i, 0], written[i, 1] = area, gap
         for axis in range(3):
             written[i, 2 + axis] = axes[2, axis]
@@ -165,19 +172,19 @@ def _press_part(rooms: Fields, x: Array, faces: Fields, pairing: Fields, rules: 
     Each factor of a push is a line, and its derivatives are the next ones. Slave nodes are the first.
     """
     (slave, master), (home, parts, ranges, cells, codes, members, starts) = faces, pairing
-    (table, rule, balanced, penalty), (out, of_part, of_cell) = rules, rooms
+    (table, rule, balanced, along_slave, penalty), (out, of_part, of_cell) = rules, rooms
     pushes, by_nodes, places, levers = out
     axes, on_slave, on_home, _, mean, shapes, slopes, by_area, by_foot, by_mean, by_gap, by_factor, at = of_part
     p, of_members = parts[place], (members, starts[place], starts[place + 1] - starts[place])
     face, m, on_face, size = slave[p // N_PARTS], master[home[p]], of_cell[0], of_members[2]
-    area, centre, gap = _place_node(of_part, x, face, m, table, p % N_PARTS)
+    area, centre, gap = _place_node(of_part, x, face, m, table, p % N_PARTS, along_slave)
     force, first, last = penalty * gap * area, ranges[place, 0], ranges[place, 1]
     _see_face(at[0], places, of_members, face, on_slave)
     _see_face(at[1], places, of_members, m, on_home)
     pushes[:size], by_nodes[:size, :width], levers[:size] = 0.0, 0.0, 0.0
     if width > 0:
         _differentiate_part(of_part, centre, area, table, p % N_PARTS, width)
-        _set_levers(levers, on_home, at[1], of_cell)
+        _set_levers(levers, on_slave if along_slave else on_home, at[0 if along_slave else 1], of_cell)
     for k in range(len(face)):
         pushes[at[0, k]] = force * mean[k]
         for q in range(width):
@@ -198,7 +205,7 @@ def _press_part(rooms: Fields, x: Array, faces: Fields, pairing: Fields, rules: 
     factor, whole = -penalty * gap, 0.0 * gap
     for q in range(width):
         by_factor[q] = -penalty * by_gap[q]
-    if balanced or last == first + 1:
+    if balanced or (last == first + 1 and not along_slave):
         for row in range(len(face), size):
             whole += pushes[row]
         factor = -force / whole
@@ -214,7 +221,7 @@ def _press_part(rooms: Fields, x: Array, faces: Fields, pairing: Fields, rules: 
 
 @compile_part
 def _set_levers(levers: Array, face: Array, at_face: IntArray, of_cell: Fields) -> None:
-    """Write the vectors γ: the slopes in the middle of m."""
+    """Write the vectors γ: the slopes in the middle of the face whose normal is n."""
     shapes, slopes = of_cell[5], of_cell[6]
     shapes[:] = 1 / len(face)
     middle = combine(face, shapes)
@@ -450,11 +457,18 @@ class FacePatches(TangentOfBoth):
     traits: Traits
     penalty: float  # Distributed stiffness ε̂.
     balanced: bool
+    along_slave: bool  # The normal is that of the slave face, not of the partner.
     tau: float  # The part of the height of a master face by which a foot may lie past the border and still count.
 
     def pair(self, interface: Interface, z: FloatArray, /) -> Pairing:
         """Find partners and patches of all parts, and which parts are in contact (n_parts,)."""
-        home, active, cells, codes = find_patches(interface, np.array(z).reshape(-1, 3), self.tau)
+        x = np.array(z).reshape(-1, 3)
+        if self.along_slave:
+            home, cells, codes = find_opposite_faces(interface, x)
+            active, parts = np.zeros(len(home), bool), np.flatnonzero(home >= 0)
+            active[parts] = self._nodes(interface, parts, home[parts], x)[:, 1] < 0
+        else:
+            home, active, cells, codes = find_patches(interface, x, self.tau)
         part, face = np.ascontiguousarray(cells.T)
         return Pairing({"home": home, "active": active, "part": part, "master_face": face, "corners": codes})
 
@@ -479,14 +493,9 @@ class FacePatches(TangentOfBoth):
 
     def contact_points(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> ContactPoints:
         """Return the virtual slave nodes of all parts that have a partner."""
-        x, (slave, master), parts = np.array(z).reshape(-1, 3), _faces(interface), np.flatnonzero(pairing["home"] >= 0)
-        home, active, of_part = (
-            pairing["home"][parts],
-            pairing["active"][parts],
-            _make_rooms(interface, x.dtype, 0, 0)[1],
-        )
-        written = np.empty((len(parts), 8 + slave.shape[1] + master.shape[1]))
-        _write_nodes(written, of_part, x, (slave, master), parts, home, TABLES[slave.shape[1]])
+        x, slave, parts = np.array(z).reshape(-1, 3), interface.slave.faces, np.flatnonzero(pairing["home"] >= 0)
+        home, active = pairing["home"][parts], pairing["active"][parts]
+        written = self._nodes(interface, parts, home, x)
         weight, gap, normal, centre, mean, feet = np.split(written, [1, 2, 5, 8, 8 + slave.shape[1]], axis=1)
         return ContactPoints.on_faces(
             slave_segment=parts // N_PARTS,
@@ -501,9 +510,15 @@ class FacePatches(TangentOfBoth):
             active=active,
         )
 
+    def _nodes(self, interface: Interface, parts: IntArray, home: IntArray, x: FloatArray) -> FloatArray:
+        faces, of_part = _faces(interface), _make_rooms(interface, x.dtype, 0, 0)[1]
+        written = np.empty((len(parts), 8 + faces[0].shape[1] + faces[1].shape[1]))
+        _write_nodes(written, of_part, x, faces, parts, home, self._rules(interface))
+        return written
+
     def _rules(self, interface: Interface) -> Fields:
         n_slave, n_master = (faces.shape[1] for faces in _faces(interface))
-        return TABLES[n_slave], RULES[n_master], self.balanced, self.penalty
+        return TABLES[n_slave], RULES[n_master], self.balanced, self.along_slave, self.penalty
 
 
 def _faces(interface: Interface) -> tuple[IntArray, IntArray]:
@@ -525,7 +540,7 @@ def _arrays_of(interface: Interface, pairing: Pairing) -> tuple[Fields, int]:
     return (*arrays, members[: starts[-1]], starts), size
 
 
-def vts_ppt_3d(*, penalty: float, normal: str = "master", tau: float = 1e-2) -> FacePatches | FaceQuarters:
+def vts_ppt_3d(*, penalty: float, normal: str = "master", tau: float = 1e-2) -> FacePatches:
     """VTS-PPT on faces: virtual slave nodes in four parts of each face, pressing on all master faces under their parts.
 
     Gaps, forces and projections are along the normal of the nearest master face, as the paper has it in the plane. It
@@ -537,9 +552,9 @@ def vts_ppt_3d(*, penalty: float, normal: str = "master", tau: float = 1e-2) -> 
 
     Source: Zavarise & De Lorenzis (2009), Boxes 1–3, after their Section 6.3.
     """
-    if choose("normal", normal, {"master": False, "slave": True}):
-        return press_along_slave(penalty)
-    return FacePatches(_PRINTED, check_penalty(penalty), balanced=False, tau=check_tau(tau))
+    along_slave = choose("normal", normal, {"master": False, "slave": True})
+    traits = _ALONG_SLAVE if along_slave else _PRINTED
+    return FacePatches(traits, check_penalty(penalty), balanced=False, along_slave=along_slave, tau=check_tau(tau))
 
 
 def vts_ppt_balanced_3d(*, penalty: float, tau: float = 1e-2) -> FacePatches:
@@ -548,7 +563,7 @@ def vts_ppt_balanced_3d(*, penalty: float, tau: float = 1e-2) -> FacePatches:
     Forces do not jump where a part crosses an edge of a flat master. Moment is conserved where the master covers the
     part; else the master's faces push elsewhere than in the middle of the part.
     """
-    return FacePatches(_BALANCED, check_penalty(penalty), balanced=True, tau=check_tau(tau))
+    return FacePatches(_BALANCED, check_penalty(penalty), balanced=True, along_slave=False, tau=check_tau(tau))
 
 
 _PRINTED = SURFACE_TRAITS.revise(
@@ -566,6 +581,14 @@ _PRINTED = SURFACE_TRAITS.revise(
         "continuity": "sliding-faces",
     },
     source="Zavarise & De Lorenzis, Int. J. Numer. Meth. Engng 79 (2009) 379–416, Boxes 1–3; on faces: here",
+)
+# A part that overhangs the master presses the slave with all its area, and the master with what is covered.
+_ALONG_SLAVE = SURFACE_TRAITS.revise(
+    gap="slave normal",
+    conserves_force=False,
+    conserves_moment=False,
+    witnesses={**SURFACE_TRAITS.evidence.witnesses, "balance": "tilted-faces"},
+    source="here",
 )
 _BALANCED = _PRINTED.revise(
     conserves_force=True,

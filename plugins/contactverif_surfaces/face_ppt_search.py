@@ -31,12 +31,15 @@ from contactverif.compiler import compile_inline, compile_kernel, compile_part
 from contactverif.contract.arrays import UNIT_ROUNDOFF, Array, BoolArray, FloatArray, IntArray
 from contactverif.contract.interface import QUADRILATERAL, TRIANGLE, Interface, Surface
 from contactverif.geometry.block_rows import Fields
+from contactverif_surfaces.cell_points import PAST_BORDER, SlaveView, evaluate_shapes
 from contactverif_surfaces.face_search import (
     MOST_CORNERS,
     Tree,
     clip_face,
     collect_boxes,
+    find_cells,
     holds_points,
+    longest_edges,
     may_overlap,
     measure_distance,
     set_axes,
@@ -107,6 +110,25 @@ def find_patches(interface: Interface, x: FloatArray, tau: float) -> tuple[IntAr
         room, count = count, _find_patches((home, active, cells, corners), rooms, x, surfaces, (table, tau))
         if count <= room:
             return home, active, cells[:count], corners[:count]
+
+
+def find_opposite_faces(interface: Interface, x: FloatArray) -> tuple[IntArray, IntArray, IntArray]:
+    """Return the face straight below each V along the slave's normal (n_parts,), −1 for none, and all cells.
+
+    The cells are those of `face_search`, a part for a slave face, as `find_patches` returns them. V is the mean of its
+    part's corners, so faces are triangles.
+    """
+    slave, master = interface.slave.faces, interface.master
+    corners = (PARTS[TRIANGLE][:, ::-1] @ x[slave][:, None]).reshape(-1, 3)
+    numbers, reverse = np.arange(len(corners)).reshape(-1, 3), master.faces[:, ::-1] + len(corners)
+    edges = np.repeat(longest_edges(interface.slave, x), N_PARTS), longest_edges(master, x)
+    cells, codes = find_cells(np.vstack([corners, x]), numbers, np.ascontiguousarray(reverse), *edges)
+    view = SlaveView.of_corners(corners[numbers[cells[:, 0]]], x[master.faces[cells[:, 1]]])
+    depth = evaluate_shapes(view.master, view.slave.mean(axis=1, keepdims=True)).min(axis=(1, 2))
+    home, order = np.full(len(numbers), -1), np.argsort(-depth, kind="stable")[::-1]
+    part, face = cells[order[depth[order] > -PAST_BORDER]].T
+    home[part] = face  # The deepest face of a part comes last.
+    return home, cells, codes
 
 
 @compile_inline

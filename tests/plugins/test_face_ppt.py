@@ -123,8 +123,10 @@ def test_the_partner_is_the_nearest_face_of_all(faces: tuple[int, ...]) -> None:
             assert distances[face] <= min(distances) + 1e-14 * case.largest_coordinate
 
 
-@pytest.mark.parametrize("faces", BOTH)
-@pytest.mark.parametrize("name", [PRINTED, BALANCED])
+@pytest.mark.parametrize(
+    ("name", "faces"),
+    [*((name, faces) for name in (PRINTED, BALANCED) for faces in BOTH), (f"{PRINTED}:normal=slave", (3,))],
+)
 def test_tangents_are_derivatives_on_all_kinds_of_faces(name: str, faces: tuple[int, ...]) -> None:
     random = np.random.default_rng(1)
     for case in states(smooth_surface_cases, faces, 15):
