@@ -34,13 +34,14 @@ allocated. Numbers are real or complex. Master corners have the order of the cel
 2 − j of its face.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 from scipy import sparse
 
-from contactverif.compiler import compile_inline, compile_kernel, compile_part
+from contactverif.compiler import compile_inline, compile_kernel, compile_part, constant
 from contactverif.contract.arrays import Array, FloatArray, IntArray
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.formulation import ContactPoints, Pairing, check_penalty
@@ -55,7 +56,9 @@ FRAME, MASTER, CORNERS, SLOPES = 0, 4, 7, 7 + MOST_CORNERS  # The rows of `room`
 AXES, PLACES = SLOPES + 3, SLOPES + 6  # The axes of `face_search`, and along them the corners of slave and master.
 ROOM = PLACES + 6, 4
 N_NODES = 6  # The nodes of a cell: those of the slave face, then of the master face.
-Faces = tuple[IntArray, IntArray]  # (n_cells, 3) The nodes of the slave and of the master face of each cell.
+Faces = tuple[IntArray, IntArray]  # The nodes (n_faces, 3) of all slave and of all master faces.
+Cells = tuple[IntArray, IntArray, IntArray]  # The slave and the master face of each cell, and the codes of its corners.
+NONE = constant(-1)  # No face.
 Arm = tuple[float, float, float]  # A vector in space.
 SCANNED = 64  # A row with at most so many entries is scanned for a column; in a longer one the column is bisected for.
 # The rows of `slopes`: δα and α δc by the six s_j, t_j; then a row for the force of each node by s_j, t_j, h_j.
@@ -74,15 +77,23 @@ class CentrePoint(NamedTuple):
 
 
 @compile_part
-def _place_centre(room: Array, x: Array, slave: IntArray, master: IntArray, codes: IntArray) -> CentrePoint:
+def _place_slave(room: Array, x: Array, slave: IntArray) -> float:
+    """Write what all cells of a slave face have in common; return J."""
+    set_axes(room[AXES : AXES + 3], x, slave)
+    view_face(room[PLACES : PLACES + 3], x, slave, x[slave[0]], room[AXES:], False)
+    return _set_frame(room, x, slave)
+
+
+@compile_part
+def _place_centre(
+    room: Array, x: Array, slave: IntArray, master: IntArray, codes: IntArray, size: float
+) -> CentrePoint:
     """Return the virtual slave node of a cell, and write all of its cell into `room`, an array of the shape `ROOM`.
 
     Its rows are e^1, e^2, n, e^0, the master corners, the corners of the cell (s, t), the slopes ∇λ_j, and what the
     search sees. Positions x are (n_nodes, 3); the nodes of both faces are (3,), the codes (most_corners, 2).
+    `_place_slave` comes before, and returns the size.
     """
-    size = _set_frame(room, x, slave)
-    set_axes(room[AXES : AXES + 3], x, slave)
-    view_face(room[PLACES : PLACES + 3], x, slave, x[slave[0]], room[AXES:], False)
     view_face(room[PLACES + 3 :], x, master, x[slave[0]], room[AXES:], True)
     for j in range(3):
         for row in range(3):
@@ -209,12 +220,15 @@ def _set_shapes(shapes: Array, room: Array, point: CentrePoint) -> None:
 
 @compile_kernel
 def _write_points(
-    points: FloatArray, shapes: FloatArray, room: FloatArray, x: FloatArray, faces: Faces, codes: IntArray
+    points: FloatArray, shapes: FloatArray, room: FloatArray, x: FloatArray, faces: Faces, cells: Cells
 ) -> None:
     """Write gap, weight and normal (n_cells, 5) and the shape functions (n_cells, 6) of all points."""
-    slave, master = faces
+    (slave, master), (slave_face, master_face, codes), before, size = faces, cells, NONE, 0.0
     for cell in range(len(codes)):
-        point = _place_centre(room, x, slave[cell], master[cell], codes[cell])
+        face = slave_face[cell]
+        if face != before:
+            before, size = face, _place_slave(room, x, slave[face])
+        point = _place_centre(room, x, slave[face], master[master_face[cell]], codes[cell], size)
         _set_shapes(shapes[cell], room, point)
         points[cell, 0], points[cell, 1] = point.gap, point.size * point.share
         for axis in range(3):
@@ -222,36 +236,43 @@ def _write_points(
 
 
 @compile_kernel
-def _add_forces(forces: Array, rooms: Fields, x: Array, cells: Fields, penalty: float) -> None:
-    (room, shapes), ((slave, master), codes, active) = rooms, cells
+def _add_forces(
+    forces: Array, rooms: Fields, x: Array, faces: Faces, cells: Cells, numbers: IntArray, penalty: float
+) -> None:
+    (room, shapes), (slave, master), (slave_face, master_face, codes) = rooms, faces, cells
     for state in range(len(x)):
-        for cell in range(len(codes)):
-            if not active[cell]:
-                continue
-            point = _place_centre(room, x[state], slave[cell], master[cell], codes[cell])
+        before, size = NONE, 0.0 * x[0, 0, 0]
+        for cell in numbers:
+            on_slave, on_master = slave[slave_face[cell]], master[master_face[cell]]
+            if slave_face[cell] != before:
+                before, size = slave_face[cell], _place_slave(room, x[state], on_slave)
+            point = _place_centre(room, x[state], on_slave, on_master, codes[cell], size)
             _set_shapes(shapes, room, point)
             force = -penalty * point.gap * point.size * point.share
             for axis in range(3):
                 push = force * room[FRAME + 2, axis]
                 for k in range(3):
-                    forces[state, slave[cell, k], axis] += shapes[k] * push
-                    forces[state, master[cell, 2 - k], axis] -= shapes[3 + k] * push
+                    forces[state, on_slave[k], axis] += shapes[k] * push
+                    forces[state, on_master[2 - k], axis] -= shapes[3 + k] * push
 
 
 @compile_kernel
 def _add_springs(forces: FloatArray, csr: Csr, rooms: Fields, x: FloatArray, cells: Fields, penalty: float) -> None:
-    (room, shapes, slopes, row), (members, codes, numbers) = rooms, cells
+    (room, shapes, slopes, row), (members, slave_face, codes, numbers) = rooms, cells
+    before, size, g_11, g_12, g_22 = NONE, 0.0, 0.0, 0.0, 0.0
     for i in range(len(numbers)):
         nodes, code = members[i], codes[numbers[i]]
-        point = _place_centre(room, x, nodes[:3], nodes[3:], code)
+        if slave_face[numbers[i]] != before:
+            before, size = slave_face[numbers[i]], _place_slave(room, x, nodes[:3])
+            g_11, g_12, g_22 = 0.0, 0.0, 0.0
+            for axis in range(3):
+                g_11 += room[FRAME, axis] * room[FRAME, axis]
+                g_12 += room[FRAME, axis] * room[FRAME + 1, axis]
+                g_22 += room[FRAME + 1, axis] * room[FRAME + 1, axis]
+        point = _place_centre(room, x, nodes[:3], nodes[3:], code, size)
         _set_shapes(shapes, room, point)
         _differentiate_centroid(slopes, room, code, point)
         _differentiate_forces(slopes, room, shapes, point, penalty)
-        g_11, g_12, g_22 = 0.0, 0.0, 0.0
-        for axis in range(3):
-            g_11 += room[FRAME, axis] * room[FRAME, axis]
-            g_12 += room[FRAME, axis] * room[FRAME + 1, axis]
-            g_22 += room[FRAME + 1, axis] * room[FRAME + 1, axis]
         force = -penalty * point.gap * point.size * point.share
         for k in range(N_NODES):
             push = force * shapes[k] if k < 3 else -force * shapes[k]
@@ -418,50 +439,56 @@ class CentreSprings(TangentOfBoth):
 
     def pair(self, interface: Interface, z: FloatArray, /) -> Pairing:
         """Find the cells, and which of them are in contact (n_cells,)."""
-        pairs = FacePairs.find(interface, z)
-        return Pairing({**pairs.as_arrays(), "active": _points(pairs, z).gap[:, 0] < 0})
+        cells = FacePairs.find(interface, z).as_arrays()
+        return Pairing({**cells, "active": _write_all(interface, cells, z)[0][:, 0] < 0})
 
     def residual(self, interface: Interface, pairing: Pairing, z: Array, /) -> Array:
         """Compute the forces (..., n_unknowns)."""
-        pairs, x = FacePairs.from_pairing(interface, pairing), np.array(z).reshape(-1, interface.n_nodes, 3)
+        x, numbers = np.array(z).reshape(-1, interface.n_nodes, 3), np.flatnonzero(pairing["active"])
         forces, rooms = np.zeros_like(x), (np.empty(ROOM, x.dtype), np.empty(N_NODES, x.dtype))
-        _add_forces(forces, rooms, x, (_faces(pairs), pairs.codes, pairing["active"]), self.penalty)
+        _add_forces(forces, rooms, x, _faces(interface), _cells(pairing), numbers, self.penalty)
         return forces.reshape(z.shape)
 
     def residual_and_tangent(
         self, interface: Interface, pairing: Pairing, z: FloatArray, /
     ) -> tuple[FloatArray, sparse.csr_array]:
         """Compute forces (n_unknowns,) and their derivative from the same points."""
-        pairs, x = FacePairs.from_pairing(interface, pairing), np.array(z).reshape(-1, 3)
-        numbers = np.flatnonzero(pairing["active"])
-        members = np.concatenate([side[numbers].astype(np.int32) for side in _faces(pairs)], axis=1)
+        x, (slave_face, master_face, codes) = np.array(z).reshape(-1, 3), _cells(pairing)
+        numbers, both = np.flatnonzero(pairing["active"]), [side.astype(np.int32) for side in _faces(interface)]
+        members = np.concatenate([both[0][slave_face[numbers]], both[1][master_face[numbers]]], axis=1)
         starts = np.arange(0, members.size + 1, N_NODES)
         matrix = zero_matrix(len(x), 0, Couplings(members.reshape(-1), starts, starts[:-1]), per_node=3)
         forces, csr = np.zeros(x.shape), (matrix.indptr, matrix.indices, matrix.data)
         rooms = np.empty(ROOM), np.empty(N_NODES), np.empty((FORCE + N_NODES, 9)), np.empty((N_NODES, 3))
-        _add_springs(forces, csr, rooms, x, (members, pairs.codes, numbers), self.penalty)
+        _add_springs(forces, csr, rooms, x, (members, slave_face, codes, numbers), self.penalty)
         return forces.reshape(-1), matrix
 
     def contact_points(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> ContactPoints:
         """Return the points of all cells."""
+        points, shapes = _write_all(interface, pairing, z)
+        slave, master = shapes[:, None, :3], shapes[:, None, :2:-1]
+        points_of_cells = CellPoints(slave, master, points[:, 1:2], points[:, :1], points[:, 2:])
         pairs = FacePairs.from_pairing(interface, pairing)
-        return report_points(pairs, _points(pairs, z), z, self.penalty, pairing["active"][:, None])
+        return report_points(pairs, points_of_cells, z, self.penalty, pairing["active"][:, None])
 
 
-def _faces(pairs: FacePairs) -> Faces:
-    """Return the triangles of each cell; the kernels would read past other faces."""
-    for nodes in (pairs.slave_nodes, pairs.master_nodes):
-        if nodes.shape[1] != TRIANGLE:
-            raise MisuseError("interface", f"faces with {nodes.shape[1]} corners", "triangles")
-    return pairs.slave_nodes, pairs.master_nodes
+def _faces(interface: Interface) -> Faces:
+    """Return the triangles of both surfaces; the kernels would read past other faces."""
+    for surface in (interface.slave, interface.master):
+        if surface.faces.shape[1] != TRIANGLE:
+            raise MisuseError("interface", f"faces with {surface.faces.shape[1]} corners", "triangles")
+    return interface.slave.faces, interface.master.faces
 
 
-def _points(pairs: FacePairs, z: FloatArray) -> CellPoints:
-    n_cells = len(pairs.codes)
-    points, shapes = np.empty((n_cells, 5)), np.empty((n_cells, 6))
-    _write_points(points, shapes, np.empty(ROOM), np.array(z).reshape(-1, 3), _faces(pairs), pairs.codes)
-    slave, master = shapes[:, None, :3], shapes[:, None, :2:-1]
-    return CellPoints(slave, master, points[:, 1:2], points[:, :1], points[:, 2:])
+def _cells(pairing: Mapping[str, IntArray]) -> Cells:
+    return pairing["slave_face"], pairing["master_face"], pairing["corners"]
+
+
+def _write_all(interface: Interface, cells: Mapping[str, IntArray], z: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return what `_write_points` writes for all cells."""
+    points, shapes = (np.empty((len(cells["corners"]), width)) for width in (5, N_NODES))
+    _write_points(points, shapes, np.empty(ROOM), np.array(z).reshape(-1, 3), _faces(interface), _cells(cells))
+    return points, shapes
 
 
 def vts_cell_3d(*, penalty: float) -> CentreSprings:

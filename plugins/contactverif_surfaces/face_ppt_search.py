@@ -101,7 +101,7 @@ def find_patches(interface: Interface, x: FloatArray, tau: float) -> tuple[IntAr
     faces, axes = tuple(map(np.empty, ((n_slave, 3), (n_master, 3), table[0].shape[1:2] + (3,)))), np.empty((2, 3, 3))
     candidates = _make_candidates(n)
     shapes = np.empty(n_slave), np.empty(n_master), np.empty((n_master, 2))
-    clips = np.empty((2, size, 2)), np.empty((2, size, 3), np.int64)
+    clips = np.empty((2, size, 2)), np.empty((2, size, 3), np.int64), np.empty(size)
     count, n_parts = 4 * len(slave) * N_PARTS, len(slave) * N_PARTS
     while True:
         home, active, mark = np.full(n_parts, -1), np.zeros(n_parts, np.bool_), np.full(n, -1)
@@ -345,7 +345,7 @@ def _find_patches(out: Fields, rooms: Fields, x: FloatArray, surfaces: Fields, r
     (home, active, cells, corners), (slave, master, neighbours, free, heights, tree) = out, surfaces
     candidates, face, on_master, part, mean, shapes, slopes, slave_axes, axes, question, clips, queue, mark = rooms
     (table, tau), normal = rules, slave_axes[2]
-    (places, codes), m, count, n_slave, n_master = clips, 0, 0, slave.shape[1], master.shape[1]
+    m, count, n_slave, n_master = 0, 0, slave.shape[1], master.shape[1]
     on_triangles = n_slave == TRIANGLE and n_master == TRIANGLE
     for p in range(len(home)):
         nodes, shares = slave[p // N_PARTS], table[0][p % N_PARTS]
@@ -383,9 +383,8 @@ def _find_patches(out: Fields, rooms: Fields, x: FloatArray, surfaces: Fields, r
             n_seen += 1
             view_face(on_master, x, master[j], origin, axes, False)
             if may_overlap(question, on_master):
-                n_corners = clip_face(
-                    part, on_master, corners[min(count, len(cells))], places, codes, measure_distance(origin)
-                )
+                room = corners[min(count, len(cells))]
+                n_corners, _ = clip_face(part, on_master, room, clips, measure_distance(origin))
             if n_corners == 0 and j == m:
                 break
             if n_corners > 0:

@@ -17,11 +17,10 @@ is no less than the distance from the origin, at which positions are rounded. Ot
 a quotient of two roundoffs: meshes that share an edge have many such pairs. For the same reason there is no cell that
 is thinner than `TIE` × size: its centroid could be anywhere.
 
-Candidates come from a tree of boxes, at a cost of O(log n) for each slave face. Boxes are sorted along a curve that
-fills space (Morton's), so that neighbours in the list are neighbours in space. Of this list `LEAF` boxes at a time are
-a leaf, and a parent is the box around its two halves. A question is a box along any three axes, seen from an origin
-near it, so that a far translation rounds nothing more. The tree leaves out what is clearly apart, and decides nothing
-else.
+Candidates come from a tree of boxes, at a cost of O(log n) for each slave face. A box with more than `LEAF` faces is
+halved across its longest axis, so that boxes side by side hardly overlap. A question is a box along any three axes,
+seen from an origin near it, so that a far translation rounds nothing more. The tree leaves out what is clearly apart,
+and decides nothing else.
 
 Rule for the next editor: this file makes decisions. It returns integers, never a real number.
 """
@@ -40,10 +39,9 @@ REACH = 2.0  # The largest gap over the sum of the longest edges of both sides.
 # whose height is H + X x + Y y.
 MIDDLE_X, MIDDLE_Y, HEIGHT, SLOPE_X, SLOPE_Y, N_COLUMNS = range(6)
 LEAF = 4  # The number of boxes in a leaf.
-BITS = 20  # The bits of a place along each axis; three such numbers are interleaved in 60 bits.
 # A box that is farther off than this share of all lengths in the comparison is apart, whatever was rounded.
 MARGIN = 64 * UNIT_ROUNDOFF
-# The numbers of the boxes along the curve (n,), and the lower and the upper corner of each box (2 n_leaves, 2, 3).
+# The numbers of the faces (n,), `LEAF` of them a leaf, and the middle and half the size of each box (2 n_leaves, 2, 3).
 # Box 1 holds everything, and box i is halved into 2i and 2i + 1. The second half are the leaves.
 Tree = tuple[IntArray, FloatArray]
 
@@ -105,10 +103,11 @@ def find_face_cells(
     room, count, most_corners, longest = 4 * (len(slave) + len(master)), 0, 1, 0.0
     slave_edge, master_edge = edges
     faces, corners = np.empty((room, 2), np.int64), np.empty((room, MOST_CORNERS, 2), np.int64)
-    on_slave, on_master = np.empty((slave.shape[1], 3)), np.empty((master.shape[1], 3))
-    axes, question, members = np.empty((3, 3)), np.empty((2, 3)), np.empty(len(master), np.int64)
+    on_slave, axes, question = np.empty((slave.shape[1], 3)), np.empty((3, 3)), np.empty((2, 3))
     places, codes = np.empty((2, 2 * MOST_CORNERS, 2)), np.empty((2, 2 * MOST_CORNERS, 3), np.int64)
-    table = np.empty((len(master), N_COLUMNS))
+    clips = places, codes, np.empty(2 * MOST_CORNERS)
+    members, rows = np.empty(len(master), np.int64), np.empty(len(master), np.int64)
+    views, table = np.empty((len(master), master.shape[1], 3)), np.empty((len(master), N_COLUMNS))
     for m in range(len(master)):
         longest = max(longest, master_edge[m])
     for s in range(len(slave)):
@@ -123,44 +122,48 @@ def find_face_cells(
         # A cell's gap is that in its middle, so the question reaches farther than rule 4 by the longest master edge.
         reach = REACH * (slave_edge[s] + longest) + longest
         question[0, 2], question[1, 2] = -reach, reach
-        masters = x, master, origin, axes, on_master
-        n_facing = _collect_facing(members, masters, question, tree)
+        n_facing = _collect_facing((members, rows, views), x, master, origin, axes, question, tree)
         if count + n_facing > room:
             room = 2 * (count + n_facing)
             old_faces, old_corners = faces, corners
             faces, corners = np.empty((room, 2), np.int64), np.empty((room, MOST_CORNERS, 2), np.int64)
             for cell in range(count):
                 _copy_cell(faces, corners, cell, old_faces, old_corners, cell)
-        first = count
+        first, size = count, measure_distance(origin)
         for place in range(n_facing):
-            m = members[place]
-            view_face(on_master, x, master[m], origin, axes, True)
-            n_corners = clip_face(on_slave, on_master, corners[count], places, codes, measure_distance(origin))
+            m, on_master, row = members[place], views[rows[place]], table[count - first]
+            n_corners, half = clip_face(on_slave, on_master, corners[count], clips, size)
             if n_corners > 0:
-                row = table[count - first]
-                _set_plane(row, places[len(on_slave) % 2], n_corners, on_master)
+                _set_plane(row, places[half], n_corners, on_master)
                 gap = _height_at(row, row[MIDDLE_X], row[MIDDLE_Y])
                 if abs(gap) <= REACH * (slave_edge[s] + master_edge[m]):
-                    faces[count, 0], faces[count, 1] = s, m
+                    faces[count, 0], faces[count, 1], rows[count - first] = s, m, rows[place]
                     count, most_corners = count + 1, max(most_corners, n_corners)
-        count = _drop_hidden(faces, corners, first, count, table, masters)
+        count = _drop_hidden(faces, corners, first, count, (table, rows, views, size))
     return faces[:count], corners[:count, :most_corners]
 
 
 @compile_part
-def _collect_facing(members: IntArray, masters: Fields, question: FloatArray, tree: Tree) -> int:
-    """Write the master faces that may overlap a slave face, in ascending order, and return how many."""
-    x, master, origin, axes, on_master = masters
-    n_facing = 0
+def _collect_facing(
+    seen: Fields,
+    x: FloatArray,
+    master: IntArray,
+    origin: FloatArray,
+    axes: FloatArray,
+    question: FloatArray,
+    tree: Tree,
+) -> int:
+    """Write the master faces that may overlap a slave face, ascending, and where their views are; return how many."""
+    (members, rows, views), n_facing = seen, 0
     for place in range(collect_boxes(members, tree, origin, axes, question)):
         m = members[place]
-        view_face(on_master, x, master[m], origin, axes, True)
-        if may_overlap(question, on_master):
+        view_face(views[n_facing], x, master[m], origin, axes, True)
+        if may_overlap(question, views[n_facing]):
             i = n_facing
             while i > 0 and members[i - 1] > m:
-                members[i] = members[i - 1]
+                members[i], rows[i] = members[i - 1], rows[i - 1]
                 i -= 1
-            members[i] = m
+            members[i], rows[i] = m, n_facing
             n_facing += 1
     return n_facing
 
@@ -246,17 +249,17 @@ def may_overlap(question: FloatArray, master: FloatArray) -> bool:
 
 @compile_part
 def clip_face(
-    slave: FloatArray, master: FloatArray, corners: IntArray, places: FloatArray, codes: IntArray, distance: float
-) -> int:
+    slave: FloatArray, master: FloatArray, corners: IntArray, room: Fields, distance: float
+) -> tuple[int, int]:
     """Clip the master face by the slave face; write the corners of what is left, and return their number, 0 for none.
 
     Stored positions are rounded at their `distance` from the origin, which ties must allow for.
 
-    Of both halves of `places` and `codes` one is written from the other, once for each slave edge: the result is in
-    half `len(slave) % 2`. A code is (i, j) and a label, which tells which edge leaves a corner: master edge j is j,
-    slave edge i is −1 − i.
+    The room is for places, codes and sides. Of both halves of places and codes one is written from the other, once for
+    each slave edge that cuts; the half of the result is returned, too. A code is (i, j) and a label, which tells which
+    edge leaves a corner: master edge j is j, slave edge i is −1 − i.
     """
-    size, count, old = distance, len(master), 0
+    (places, codes, _), size, count, old = room, distance, len(master), 0
     for i in range(len(slave)):
         size = max(size, abs(slave[i, 0]), abs(slave[i, 1]))
     for j in range(count):
@@ -264,8 +267,7 @@ def clip_face(
         places[0, j, 0], places[0, j, 1] = master[j, 0], master[j, 1]
         codes[0, j, 0], codes[0, j, 1], codes[0, j, 2] = -1, j, j
     for i in range(len(slave)):
-        before, behind = (places[old], codes[old]), (places[1 - old], codes[1 - old])
-        count, old = _cut_by_edge(slave, i, TIE * size, before, count, behind), 1 - old
+        count, old = _cut_by_edge(slave, i, TIE * size, room, count, old)
     area, longest, cell = 0.0, 0.0, places[old]
     for v in range(1, count):
         w = v + 1 if v + 1 < count else v
@@ -273,40 +275,53 @@ def clip_face(
         area += (x * (cell[w, 1] - cell[0, 1]) - y * (cell[w, 0] - cell[0, 0])) / 2
         longest = max(longest, x * x + y * y)
     if area <= np.sqrt(longest) * (TIE * size):  # A thin cell
-        return 0
+        return 0, old
     for v in range(len(corners)):
         corners[v, 0], corners[v, 1] = codes[old, min(v, count - 1), 0], codes[old, min(v, count - 1), 1]
-    return count
+    return count, old
 
 
 @compile_part
-def _cut_by_edge(slave: FloatArray, i: int, width: float, cell: Fields, count: int, new_cell: Fields) -> int:
-    """Write what lies within slave edge i of a cell of so many corners, and return the number of its corners."""
-    (places, codes), (new_places, new_codes) = cell, new_cell
-    after, n_left = (i + 1) % len(slave), 0
+def _cut_by_edge(slave: FloatArray, i: int, width: float, room: Fields, count: int, old: int) -> tuple[int, int]:
+    """Write what lies within slave edge i of a cell of so many corners; return the number of its corners, and its half.
+
+    The half is the old one if the edge cuts nothing off.
+    """
+    (places, codes, sides), after, n_left, lowest = room, (i + 1) % len(slave), 0, 0.0
     along, across = slave[after, 0] - slave[i, 0], slave[after, 1] - slave[i, 1]
-    tie = width * np.sqrt(along * along + across * across)
     for v in range(count):
-        w = (v + 1) % count
-        here = along * (places[v, 1] - slave[i, 1]) - across * (places[v, 0] - slave[i, 0])
-        there = along * (places[w, 1] - slave[i, 1]) - across * (places[w, 0] - slave[i, 0])
+        sides[v] = along * (places[old, v, 1] - slave[i, 1]) - across * (places[old, v, 0] - slave[i, 0])
+        lowest = min(lowest, sides[v])
+    if lowest == 0:
+        return count, old
+    tie, new = width * np.sqrt(along * along + across * across), 1 - old
+    if lowest >= -tie:
+        return count, old
+    for v in range(count):
+        w = v + 1 if v + 1 < count else 0
+        here, there = sides[v], sides[w]
         if here >= -tie:
-            new_places[n_left, 0], new_places[n_left, 1] = places[v, 0], places[v, 1]
+            places[new, n_left, 0], places[new, n_left, 1] = places[old, v, 0], places[old, v, 1]
             # A corner on the edge goes on along it, if what follows lies beyond.
-            label = -1 - i if here <= tie and there < -tie else codes[v, 2]
-            new_codes[n_left, 0], new_codes[n_left, 1], new_codes[n_left, 2] = codes[v, 0], codes[v, 1], label
+            label = -1 - i if here <= tie and there < -tie else codes[old, v, 2]
+            codes[new, n_left, 0], codes[new, n_left, 1], codes[new, n_left, 2] = (
+                codes[old, v, 0],
+                codes[old, v, 1],
+                label,
+            )
             n_left += 1
         if min(here, there) < -tie and max(here, there) > tie:
-            share, label = here / (here - there), codes[v, 2]
-            new_places[n_left, 0] = places[v, 0] + share * (places[w, 0] - places[v, 0])
-            new_places[n_left, 1] = places[v, 1] + share * (places[w, 1] - places[v, 1])
+            share, label = here / (here - there), codes[old, v, 2]
+            for axis in range(2):
+                start = places[old, v, axis]
+                places[new, n_left, axis] = start + share * (places[old, w, axis] - start)
             if label >= 0:
-                new_codes[n_left, 0], new_codes[n_left, 1] = i, label
+                codes[new, n_left, 0], codes[new, n_left, 1] = i, label
             else:  # Two slave edges cross at a corner.
-                new_codes[n_left, 0], new_codes[n_left, 1] = i if -label % len(slave) == i else after, -1
-            new_codes[n_left, 2] = -1 - i if here > tie else label
+                codes[new, n_left, 0], codes[new, n_left, 1] = i if -label % len(slave) == i else after, -1
+            codes[new, n_left, 2] = -1 - i if here > tie else label
             n_left += 1
-    return n_left
+    return n_left, new
 
 
 @compile_part
@@ -314,8 +329,9 @@ def _set_plane(row: FloatArray, places: FloatArray, count: int, master: FloatArr
     """Write the middle of a cell and the plane of its master face: that of its diagonals, through its corners' mean."""
     row[MIDDLE_X], row[MIDDLE_Y], row[HEIGHT] = 0.0, 0.0, 0.0
     for v in range(count):
-        row[MIDDLE_X] += places[v, 0] / count
-        row[MIDDLE_Y] += places[v, 1] / count
+        row[MIDDLE_X] += places[v, 0]
+        row[MIDDLE_Y] += places[v, 1]
+    row[MIDDLE_X], row[MIDDLE_Y] = row[MIDDLE_X] / count, row[MIDDLE_Y] / count
     last, start = (2, 0) if len(master) == 3 else (3, 1)
     first = 1 if len(master) == 3 else 2
     a_x, a_y, a_z = master[first, 0] - master[0, 0], master[first, 1] - master[0, 1], master[first, 2] - master[0, 2]
@@ -333,22 +349,19 @@ def _height_at(row: FloatArray, x: float, y: float) -> float:
 
 
 @compile_part
-def _drop_hidden(faces: IntArray, corners: IntArray, first: int, count: int, table: FloatArray, masters: Fields) -> int:
+def _drop_hidden(faces: IntArray, corners: IntArray, first: int, count: int, of_cells: Fields) -> int:
     """Keep the cells, from the first one of a slave face on, in whose middle no other master face is nearer."""
-    x, master, origin, axes, on_master = masters
-    for other in range(first, count):
-        view_face(on_master, x, master[faces[other, 1]], origin, axes, True)
-        for cell in range(first, count):
-            row, middle = table[cell - first], table[cell - first : cell - first + 1]
-            x_m, y_m = row[MIDDLE_X], row[MIDDLE_Y]
-            if other == cell or not holds_points(on_master, middle, measure_distance(origin)):
-                continue
-            if abs(_height_at(table[other - first], x_m, y_m)) < abs(_height_at(row, x_m, y_m)):
-                faces[cell, 0] = -1
-    n_left = first
+    (table, rows, views, size), n_left = of_cells, first
     for cell in range(first, count):
-        if faces[cell, 0] >= 0:
-            _copy_cell(faces, corners, n_left, faces, corners, cell)
+        k, hidden = cell - first, False
+        x, y = table[k, MIDDLE_X], table[k, MIDDLE_Y]
+        height = abs(_height_at(table[k], x, y))
+        for other in range(count - first):
+            if abs(_height_at(table[other], x, y)) < height:
+                hidden = hidden or holds_points(views[rows[other]], table[k : k + 1], size)
+        if not hidden:
+            if n_left < cell:
+                _copy_cell(faces, corners, n_left, faces, corners, cell)
             n_left += 1
     return n_left
 
@@ -359,37 +372,65 @@ def holds_points(face: FloatArray, points: FloatArray, size: float) -> bool:
 
     The size is the distance at which positions are rounded.
     """
-    for corners in (face, points):
-        for i in range(len(corners)):
-            size = max(size, abs(corners[i, 0]), abs(corners[i, 1]))
     for j in range(len(face)):
         k = (j + 1) % len(face)
         along, across = face[k, 0] - face[j, 0], face[k, 1] - face[j, 1]
-        width = TIE * size * np.sqrt(along * along + across * across)
         for i in range(len(points)):
-            if along * (points[i, 1] - face[j, 1]) - across * (points[i, 0] - face[j, 0]) < -width:
+            place = along * (points[i, 1] - face[j, 1]) - across * (points[i, 0] - face[j, 0])
+            if place < 0 and place < -_tie_of(face, points, size) * np.sqrt(along * along + across * across):
                 return False
     return True
 
 
+@compile_part
+def _tie_of(face: FloatArray, points: FloatArray, size: float) -> float:
+    for corners in (face, points):
+        for i in range(len(corners)):
+            size = max(size, abs(corners[i, 0]), abs(corners[i, 1]))
+    return TIE * size
+
+
 def grow_tree(boxes: FloatArray) -> Tree:
     """Return the tree of boxes (n, 2, 3), lower and upper corner each."""
-    middle = boxes.mean(axis=1)
-    size = float((middle.max(axis=0) - middle.min(axis=0)).max())
-    scale = (2**BITS - 1) / size if size > 0 else 0.0
-    places, keys = ((middle - middle.min(axis=0)) * scale).astype(np.int64), np.zeros(len(boxes), np.int64)
-    for bit in range(BITS - 1, -1, -1):
-        for axis in range(3):
-            keys = 2 * keys + ((places[:, axis] >> bit) & 1)
-    order = np.argsort(keys, kind="stable")
-    nodes = np.empty((2 << max(0, (len(boxes) - 1) // LEAF).bit_length(), 2, 3))
+    order, nodes = np.arange(len(boxes)), np.empty((2 << max(0, (len(boxes) - 1) // LEAF).bit_length(), 2, 3))
+    _halve_boxes(order, np.empty(len(boxes)), boxes.sum(axis=1), len(nodes) // 2)
     _write_boxes(order, nodes, boxes)
     return order, nodes
 
 
 @compile_kernel
+def _halve_boxes(order: IntArray, keys: FloatArray, middles: FloatArray, n_leaves: int) -> None:
+    """Sort boxes so that the halves of each box lie on both sides of a plane, across its longest axis."""
+    width = n_leaves
+    while width > 1:
+        for first in range(0, n_leaves, width):
+            start, cut, end = first * LEAF, (first + width // 2) * LEAF, min((first + width) * LEAF, len(order))
+            longest, length = 0, -1.0
+            for axis in range(3 if cut < end else 0):
+                low, high = np.inf, -np.inf
+                for place in range(start, end):
+                    low, high = min(low, middles[order[place], axis]), max(high, middles[order[place], axis])
+                if high - low > length:
+                    longest, length = axis, high - low
+            for place in range(start, end if cut < end else start):
+                keys[place] = middles[order[place], longest]
+            while start < end and cut < end:  # Hoare's selection: what is below the cut comes before it.
+                i, j, middle = start, end - 1, keys[(start + end) // 2]
+                while i <= j:
+                    while keys[i] < middle:
+                        i += 1
+                    while keys[j] > middle:
+                        j -= 1
+                    if i <= j:
+                        keys[i], keys[j], order[i], order[j] = keys[j], keys[i], order[j], order[i]
+                        i, j = i + 1, j - 1
+                start, end = (start, j + 1) if cut <= j else ((i, end) if cut >= i else (end, end))
+        width //= 2
+
+
+@compile_kernel
 def _write_boxes(order: IntArray, nodes: FloatArray, boxes: FloatArray) -> None:
-    """Write the boxes of a tree; those of empty leaves meet nothing."""
+    """Write the middle and half the size of the boxes of a tree; those of empty leaves meet nothing."""
     n_leaves = len(nodes) // 2
     for box in range(len(nodes)):
         for axis in range(3):
@@ -403,6 +444,11 @@ def _write_boxes(order: IntArray, nodes: FloatArray, boxes: FloatArray) -> None:
         for axis in range(3):
             nodes[parent, 0, axis] = min(nodes[2 * parent, 0, axis], nodes[2 * parent + 1, 0, axis])
             nodes[parent, 1, axis] = max(nodes[2 * parent, 1, axis], nodes[2 * parent + 1, 1, axis])
+    for box in range(len(nodes)):
+        for axis in range(3):
+            low, high = nodes[box, 0, axis], nodes[box, 1, axis]
+            middle = low / 2 + high / 2 if low <= high else 0.0
+            nodes[box, 0, axis], nodes[box, 1, axis] = middle, max(high - middle, middle - low)
 
 
 @compile_part
@@ -433,17 +479,13 @@ def collect_boxes(members: IntArray, tree: Tree, origin: FloatArray, axes: Float
 @compile_part
 def _meets(box: FloatArray, origin: FloatArray, axes: FloatArray, question: FloatArray) -> bool:
     """Return whether a box (2, 3) may meet a question; an empty one does not."""
-    if box[0, 0] > box[1, 0]:
-        return False
     for row in range(3):
-        nearest, farthest, size = 0.0, 0.0, 0.0
+        middle, half, size = 0.0, 0.0, 0.0
         for axis in range(3):
-            first = axes[row, axis] * (box[0, axis] - origin[axis])
-            second = axes[row, axis] * (box[1, axis] - origin[axis])
-            nearest += min(first, second)
-            farthest += max(first, second)
-            size += abs(first) + abs(second)
-        margin = MARGIN * size
-        if nearest > question[1, row] + margin or farthest < question[0, row] - margin:
+            arm = axes[row, axis] * (box[0, axis] - origin[axis])
+            middle, size = middle + arm, size + abs(arm)
+            half += abs(axes[row, axis]) * box[1, axis]
+        half += MARGIN * (size + half)
+        if middle - half > question[1, row] or middle + half < question[0, row]:
             return False
     return True
