@@ -81,8 +81,8 @@ def _make_pattern(
     begins, member_starts = np.zeros((2, n_numbers + 1), dtype=np.int64)
     members, ends = np.empty(len(couplings[0]), dtype=np.int32), np.empty(n_numbers, dtype=np.int64)
     _write_members(begins, ends, (member_starts, members), couplings)
-    columns = np.empty(begins[-1], dtype=np.int32)
-    n_entries = _write_columns((begins, ends, columns), (member_starts, members), couplings, sizes)
+    columns, latest = np.empty(begins[-1], dtype=np.int32), np.full(n_numbers, NO_NODE, dtype=np.int32)
+    n_entries = _write_columns((begins, ends, columns, latest), (member_starts, members), couplings, sizes)
     number: type[np.int32 | np.int64] = np.int32 if n_entries <= _MOST else np.int64
     indptr, indices = np.empty(per_node * n_nodes + n_multipliers + 1, dtype=number), np.empty(n_entries, dtype=number)
     _write_pattern(indptr, indices, (begins, ends, columns), sizes)
@@ -117,9 +117,9 @@ def _write_columns(rows: Fields, of_columns: Fields, couplings: Fields, sizes: t
     """Write the columns of each row, nodes and multipliers by number: columns[begins[row]:ends[row]], ascending.
 
     Return the number of entries. Columns are visited in ascending order, so they are sorted as they come, and one that
-    comes twice was the last.
+    comes twice was the latest.
     """
-    (begins, ends, columns), (n_nodes, per_node) = rows, sizes
+    (begins, ends, columns, latest), (n_nodes, per_node) = rows, sizes
     (member_starts, members), (nodes, starts, first_row) = of_columns, couplings
     n_entries = 0
     for row in range(len(ends)):
@@ -130,10 +130,9 @@ def _write_columns(rows: Fields, of_columns: Fields, couplings: Fields, sizes: t
             coupling = members[member]
             for place in range(first_row[coupling], starts[coupling + 1]):
                 row = nodes[place]
-                end = ends[row]
-                if end == begins[row] or columns[end - 1] != column:
-                    columns[end] = column
-                    ends[row] = end + 1
+                if latest[row] != column:
+                    latest[row], columns[ends[row]] = column, column
+                    ends[row] += 1
                     n_entries += per_node * width if row < n_nodes else width
     return n_entries
 

@@ -65,10 +65,7 @@ class FacePairs:
     @classmethod
     def find(cls, interface: Interface, z: FloatArray) -> Self:
         """Return the cells of an interface at a state z (n_unknowns,)."""
-        x, slave, master = np.array(z).reshape(-1, 3), interface.slave, interface.master
-        faces, codes = find_cells(x, slave.faces, master.faces, longest_edges(slave, x), longest_edges(master, x))
-        arrays = {"slave_face": faces[:, 0], "master_face": faces[:, 1], "corners": codes}
-        return cls.from_pairing(interface, arrays)
+        return cls.from_pairing(interface, pair_faces(interface, z))
 
     @classmethod
     def from_pairing(cls, interface: Interface, pairing: Mapping[str, IntArray]) -> Self:
@@ -97,6 +94,13 @@ class FacePairs:
     def view_at(self, z: FloatArray) -> "SlaveView":
         """Return the cells as their slave faces see them at a state z (n_unknowns,)."""
         return SlaveView.of_corners(positions_of(z, self.slave_nodes), positions_of(z, self.master_nodes))
+
+
+def pair_faces(interface: Interface, z: FloatArray) -> dict[str, IntArray]:
+    """Return the integers of the cells of an interface at a state z (n_unknowns,), as a pairing has them."""
+    x, slave, master = np.array(z).reshape(-1, 3), interface.slave, interface.master
+    faces, codes = find_cells(x, slave.faces, master.faces, longest_edges(slave, x), longest_edges(master, x))
+    return {"slave_face": faces[:, 0].copy(), "master_face": faces[:, 1].copy(), "corners": codes}
 
 
 def first_faces(faces: IntArray, nodes: IntArray) -> tuple[IntArray, FloatArray]:

@@ -48,7 +48,7 @@ from contactverif.contract.formulation import ContactPoints, Pairing, check_pena
 from contactverif.contract.interface import TRIANGLE, Interface
 from contactverif.contract.traits import Traits
 from contactverif.geometry.block_rows import Couplings, Csr, Fields, NumberArray, TangentOfBoth, find_entry, zero_matrix
-from contactverif_surfaces.cell_points import SURFACE_TRAITS, CellPoints, FacePairs, report_points
+from contactverif_surfaces.cell_points import SURFACE_TRAITS, CellPoints, FacePairs, pair_faces, report_points
 from contactverif_surfaces.face_search import MOST_CORNERS, set_axes, view_face
 
 S, T, H, REST = 0, 1, 2, 3  # The columns of a master corner; the last one is 1 − s − t.
@@ -439,7 +439,7 @@ class CentreSprings(TangentOfBoth):
 
     def pair(self, interface: Interface, z: FloatArray, /) -> Pairing:
         """Find the cells, and which of them are in contact (n_cells,)."""
-        cells = FacePairs.find(interface, z).as_arrays()
+        cells = pair_faces(interface, z)
         return Pairing({**cells, "active": _write_all(interface, cells, z)[0][:, 0] < 0})
 
     def residual(self, interface: Interface, pairing: Pairing, z: Array, /) -> Array:

@@ -479,6 +479,8 @@ def collect_boxes(members: IntArray, tree: Tree, origin: FloatArray, axes: Float
 @compile_part
 def _meets(box: FloatArray, origin: FloatArray, axes: FloatArray, question: FloatArray) -> bool:
     """Return whether a box (2, 3) may meet a question; an empty one does not."""
+    if box[1, 0] < 0:
+        return False
     for row in range(3):
         middle, half, size = 0.0, 0.0, 0.0
         for axis in range(3):
