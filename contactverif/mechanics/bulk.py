@@ -23,7 +23,8 @@ from contactverif.contract.body import Body
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.interface import PLANE, SPACE, unit_normals
 
-CACHE_SIZE = 512  # Number of condensed bodies that are remembered: penalties and formulations of one run share them.
+# The numbers of condensed bodies and of scenes that are remembered: two formulations share those of 100 cases.
+CACHE_SIZE, SCENES_SIZE = 256, 128
 SHARED_SIZE = 64  # Number of factorised meshes that are remembered: loads, places and penalties share them.
 DENSE_SHARE = 0.25  # From this share of entries on, a matrix of any size is factorised sooner if it is dense.
 DENSE_LIMIT = 600  # Largest number of unknowns for which a dense matrix is factorised as fast as a sparse one.

@@ -15,11 +15,11 @@ from contactverif.contract.arrays import FloatArray, IntArray
 from contactverif.contract.body import Body
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.interface import SPACE, Interface
-from contactverif.mechanics.bulk import CACHE_SIZE
+from contactverif.mechanics.bulk import SCENES_SIZE
 from contactverif.mechanics.scene import Scene
 
 
-@lru_cache(maxsize=CACHE_SIZE)
+@lru_cache(maxsize=SCENES_SIZE)
 def change_units(scene: Scene, length: float, modulus: float) -> Scene:
     """Return the scene with all lengths and all moduli multiplied.
 
@@ -59,7 +59,7 @@ def change_units(scene: Scene, length: float, modulus: float) -> Scene:
     return changed
 
 
-@lru_cache(maxsize=CACHE_SIZE)
+@lru_cache(maxsize=SCENES_SIZE)
 def snap(scene: Scene, spacing: float) -> Scene:
     """Return the scene with coordinates rounded to multiples of `spacing`, a power of two far shorter than a cell."""
     bodies = tuple(replace(body, nodes=np.rint(body.nodes / spacing) * spacing) for body in scene.bodies)

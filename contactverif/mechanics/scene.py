@@ -24,9 +24,9 @@ from contactverif.contract.engine import EngineAnswer, SceneArrays
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.interface import PLANE, Interface, Surface, ways_to_master
 from contactverif.mechanics.bulk import (
-    CACHE_SIZE,
     DENSE_LIMIT,
     DENSE_SHARE,
+    SCENES_SIZE,
     CondensedBody,
     assemble_stiffness,
     condense,
@@ -464,7 +464,7 @@ _ORIGINS: OrderedDict[Case, Scene] = OrderedDict()
 
 def _remember(case: Case, scene: Scene) -> None:
     _ORIGINS[case] = scene
-    if len(_ORIGINS) > CACHE_SIZE:
+    if len(_ORIGINS) > SCENES_SIZE:
         _ORIGINS.popitem(last=False)
 
 

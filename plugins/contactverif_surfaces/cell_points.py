@@ -23,7 +23,7 @@ from contactverif.contract.traits import Abilities, Evidence, PatchPromises, Pro
 from contactverif_surfaces.face_search import find_cells, longest_edges
 
 STEP = 2.0**-200
-CHUNK = 500  # The number of cells that are differentiated together, so that memory stays small.
+CHUNK = 100  # The number of cells that are differentiated together, so that memory stays small.
 # A foot past the border of a face by this share of it still counts, since one on an edge between two faces must stand
 # on one of them. Shape functions are rounded by 2⁻⁵³ × how slender a face is: enough for faces of 1 : 10⁶.
 PAST_BORDER = 2.0**-30
