@@ -310,10 +310,8 @@ def unknowns_of(nodes: IntArray) -> IntArray:
 
 def add_blocks(blocks: FloatArray, rows: IntArray, columns: IntArray, shape: tuple[int, int]) -> sparse.csr_array:
     """Return the sum of blocks (n_cells, a, b) at rows (n_cells, a) and columns (n_cells, b) of a matrix."""
-    places = (
-        np.broadcast_to(rows[:, :, None], blocks.shape).reshape(-1),
-        np.broadcast_to(columns[:, None, :], blocks.shape).reshape(-1),
-    )
+    numbers = (rows.astype(np.int32)[:, :, None], columns.astype(np.int32)[:, None, :])  # As scipy numbers them.
+    places = tuple(np.broadcast_to(each, blocks.shape).reshape(-1) for each in numbers)
     return sparse.coo_array((blocks.reshape(-1), places), shape=shape).tocsr()
 
 

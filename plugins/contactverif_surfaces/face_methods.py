@@ -49,6 +49,7 @@ from contactverif_surfaces.face_ppt_search import find_nearest_faces
 from contactverif_surfaces.face_search import REACH, longest_edges
 
 PointRule = Callable[[SlaveView, IntArray], CellPoints]  # It takes the view and the codes of cells.
+MOST_STATES = 2000  # The number of cells, one in each state, whose forces are computed together.
 N_POINTS = 6  # Gauss points a triangle of the mortar method: a gap × two shape functions has degree 3.
 
 
@@ -67,9 +68,17 @@ class CellSprings:
 
     def residual(self, interface: Interface, pairing: Pairing, z: Array, /) -> Array:
         """Compute the forces (..., n_unknowns)."""
-        pairs = FacePairs.from_pairing(interface, pairing)
-        local = self._forces(pairs.n_slave_corners, pairs.corners_at(z), pairs.codes, pairing["active"])
-        return add_rows(local, unknowns_of(pairs.nodes), z.shape[-1])
+        pairs, states = FacePairs.from_pairing(interface, pairing), z.reshape(-1, z.shape[-1])
+        places, step, forces = (
+            unknowns_of(pairs.nodes),
+            1 + MOST_STATES // (1 + len(pairs.codes)),
+            np.empty_like(states),
+        )
+        for first in range(0, len(states), step):
+            corners = pairs.corners_at(states[first : first + step])
+            local = self._forces(pairs.n_slave_corners, corners, pairs.codes, pairing["active"])
+            forces[first : first + step] = add_rows(local, places, z.shape[-1])
+        return forces.reshape(z.shape)
 
     def tangent(self, interface: Interface, pairing: Pairing, z: FloatArray, /) -> sparse.csr_array:
         """Compute the derivative of the residual, sparse."""
