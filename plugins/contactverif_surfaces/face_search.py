@@ -145,7 +145,7 @@ def find_face_cells(
 
 @compile_part
 def _collect_facing(
-    seen: Fields,
+    candidates: Fields,
     x: FloatArray,
     master: IntArray,
     origin: FloatArray,
@@ -154,7 +154,7 @@ def _collect_facing(
     tree: Tree,
 ) -> int:
     """Write the master faces that may overlap a slave face, ascending, and where their views are; return how many."""
-    (members, rows, views), n_facing = seen, 0
+    (members, rows, views), n_facing = candidates, 0
     for place in range(collect_boxes(members, tree, origin, axes, question)):
         m = members[place]
         view_face(views[n_facing], x, master[m], origin, axes, True)
