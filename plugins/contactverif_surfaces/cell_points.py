@@ -45,10 +45,13 @@ SURFACE_TRAITS = Traits(
         unbiased=False,
         nodes_push=True,
         translation_stable=True,
+        locks=True,
     ),
     rules=Rules(gap="cells", force_along="slave normal", penalty="distributed", area="current"),
     abilities=Abilities(dimensions=(3,), faces=(3,), batched=True, takes_complex=True),
-    evidence=Evidence(witnesses={"symmetric": "tilted-faces", "swap": "tilted-faces"}),
+    evidence=Evidence(
+        witnesses={"symmetric": "tilted-faces", "swap": "tilted-faces", "stability.locking": "12 on 8, ε̂ = 1e8 E/h"}
+    ),
 )
 
 

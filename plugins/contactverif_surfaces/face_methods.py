@@ -218,7 +218,9 @@ def mortar_3d(*, penalty: float) -> SurfaceMortar:
     """
     source = "Puso & Laursen, Comput. Methods Appl. Mech. Engrg. 193 (2004) 601–629; the slave's normal: here"
     shapes = {"gap_shapes": "standard", "pressure_shapes": "standard"}
-    return SurfaceMortar(SURFACE_TRAITS.revise(faces=(3, 4), source=source, **shapes), check_penalty(penalty))
+    return SurfaceMortar(
+        SURFACE_TRAITS.revise(faces=(3, 4), locks=False, source=source, **shapes), check_penalty(penalty)
+    )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -336,6 +338,7 @@ def nts_ar_3d(*, penalty: float) -> NodesOnFaces:
 _TRAITS = SURFACE_TRAITS.revise(
     flat=False,
     normal=True,
+    locks=False,
     gap="closest point",
     force_along="master normal",
     witnesses={**SURFACE_TRAITS.evidence.witnesses, "patch": "crossed-diagonals"},
