@@ -140,9 +140,7 @@ class EggMesh(NamedTuple):
     name: str
     upper: tuple[int, int] = (4, 3)
     lower: tuple[int, int] = (3, 4)
-    skew: float = (
-        0.0  # By how much of a side nodes inside are moved along both axes, to and fro; no waves if it is not 0
-    )
+    skew: float = 0.0  # By how much of a side nodes inside are moved, back and forth; where it is not 0 are no waves.
 
 
 EGG_MESHES = EggMesh(""), EggMesh(", skewed, no waves", skew=0.2), EggMesh(", 3 times finer", (3, 3), (9, 10))

@@ -218,9 +218,9 @@ def accuracy_wavy(case: Case, subject: Subject) -> Measurement:
     tetrahedra 0.04 and 1.3 are allowed, as a dual mortar method has 0.022 and 1.43; multipliers may have 0.1 and 1.2,
     as springs of 1e6 have 0.044 and 1.27 there. E_F at r = 2 is at most 0.05; right ones have 0.03. Two more meshes
     show what these do not: 3r × 3r faces on 9r × 10r, where E_F of a right one is up to 0.1, and hexahedra whose nodes
-    are moved to and fro by a fifth of a side. There the pressure is uniform, and E_F is at most 0.01: 0.005 is measured
-    with Gauss points on whole faces, 1e-4 with cells, and 0.03 and more where areas or shape functions are those of a
-    parallelogram.
+    are moved back and forth by a fifth of a side. There the pressure is uniform, and E_F is at most 0.01: 0.005 is
+    measured with Gauss points on whole faces, 1e-4 with cells, and 0.03 and more where areas or shape functions are
+    those of a parallelogram.
 
     **Undecided.** Where Newton's method finds no solution on one of the meshes.
 
