@@ -23,17 +23,7 @@ from contactverif.contract.case import BODIES, Case
 from contactverif.contract.engine import EngineAnswer, SceneArrays
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.interface import PLANE, Interface, Surface, ways_to_master
-from contactverif.mechanics.bulk import (
-    DENSE_LIMIT,
-    DENSE_SHARE,
-    SCENES_SIZE,
-    CondensedBody,
-    assemble_stiffness,
-    condense,
-    forget_condensed,
-    free_on_contact,
-    loose_modes,
-)
+from contactverif.mechanics import bulk
 
 _SAME = 64 * UNIT_ROUNDOFF  # Coordinates that differ by less, over the largest one, were equal before they were turned.
 
@@ -189,7 +179,7 @@ class Scene:
         if len({body.dim for body in self.bodies}) > 1:
             raise MisuseError("bodies", "bodies in the plane and bodies in space", "either")
         for body in self.bodies:
-            if loose := loose_modes(body):
+            if loose := bulk.loose_modes(body):
                 needed = "fixed components that prevent it (contact without friction does not)"
                 actual = f"{'too few' if body.fixed.any() else 'none'}: it can {' and '.join(loose)}"
                 raise MisuseError(f"supports of {body.name}", actual, needed)
@@ -234,9 +224,9 @@ class Scene:
         return np.concatenate([first[index] + self.bodies[index].contact_nodes for index in self.bodies_in_reach])
 
     @cached_property
-    def condensed_bodies(self) -> tuple[CondensedBody, ...]:
+    def condensed_bodies(self) -> tuple[bulk.CondensedBody, ...]:
         """The bodies within reach, condensed, in the order of `bodies_in_reach`."""
-        return tuple(map(condense, self._reached))
+        return tuple(map(bulk.condense, self._reached))
 
     @cached_property
     def interface(self) -> Interface:
@@ -252,7 +242,7 @@ class Scene:
     @cached_property
     def unknowns(self) -> tuple[IntArray, ...]:
         """The unknowns of each body within reach: dim × node + component of what is free on its contact boundary."""
-        return tuple(map(free_on_contact, self._reached))
+        return tuple(map(bulk.free_on_contact, self._reached))
 
     @cached_property
     def slices(self) -> tuple[slice, ...]:
@@ -270,7 +260,7 @@ class Scene:
         """The stiffness S (n_free, n_free) of all bodies within reach: dense if it is small or has few blocks."""
         blocks = [body.stiffness for body in self.condensed_bodies]
         n_entries = sum(block.size for block in blocks)  # Blocks are full.
-        if self.n_free <= DENSE_LIMIT or n_entries >= DENSE_SHARE * self.n_free**2:
+        if self.n_free <= bulk.DENSE_LIMIT or n_entries >= bulk.DENSE_SHARE * self.n_free**2:
             matrix = np.zeros((self.n_free, self.n_free))
             for part, block in zip(self.slices, blocks, strict=True):
                 matrix[part, part] = block
@@ -301,7 +291,7 @@ class Scene:
             first += len(body.contact_nodes)
         shape = (self.interface.n_unknowns, self.n_free)
         places = np.concatenate(rows), np.concatenate(columns)
-        if self.n_free <= DENSE_LIMIT:
+        if self.n_free <= bulk.DENSE_LIMIT:
             matrix = np.zeros(shape)
             matrix[places] = np.concatenate(values)
             return matrix
@@ -428,10 +418,10 @@ class Scene:
         there = replace(self.interface, nodes=positions.reshape(-1, self.dim))
         return float(min(ways_to_master(each)[0].min() for each in (there, there.swap_roles())))
 
-    def _all_unknowns(self, q: FloatArray, factor: float) -> list[tuple[CondensedBody, FloatArray]]:
+    def _all_unknowns(self, q: FloatArray, factor: float) -> list[tuple[bulk.CondensedBody, FloatArray]]:
         """Return every body with its unknowns; those of a body out of reach are solved for here."""
         unknowns = dict(zip(self.bodies_in_reach, (q[part] for part in self.slices), strict=True))
-        condensed = tuple(map(condense, self.bodies))
+        condensed = tuple(map(bulk.condense, self.bodies))
         for number, body in enumerate(condensed):
             if number not in unknowns and len(body.unknowns):
                 if (free := _move_freely(body, factor)) is None:
@@ -441,7 +431,7 @@ class Scene:
         return [(body, unknowns.get(number, np.zeros(0))) for number, body in enumerate(condensed)]
 
 
-def _move_freely(body: CondensedBody, factor: float) -> FloatArray | None:
+def _move_freely(body: bulk.CondensedBody, factor: float) -> FloatArray | None:
     """Return the unknowns of a body that touches nothing, for a share of its loads; None if its supports are loose."""
     if not len(body.unknowns):
         return np.zeros(0)
@@ -464,14 +454,14 @@ _ORIGINS: OrderedDict[Case, Scene] = OrderedDict()
 
 def _remember(case: Case, scene: Scene) -> None:
     _ORIGINS[case] = scene
-    if len(_ORIGINS) > SCENES_SIZE:
+    if len(_ORIGINS) > bulk.SCENES_SIZE:
         _ORIGINS.popitem(last=False)
 
 
 def forget_bodies() -> None:
     """Let go of all scenes and condensed bodies, before the time that they take is measured."""
     _ORIGINS.clear()
-    forget_condensed()
+    bulk.forget_condensed()
 
 
 def scene_of(case: Case) -> Scene:
@@ -511,7 +501,7 @@ class WholeScene(Scene):
         """The stiffness (n_free, n_free) of all bodies within reach: dense if it is small, else sparse."""
         blocks = [rows[:, free] for rows, free in zip(self._rows, self.unknowns, strict=True)]
         matrix = sparse.csr_array(sparse.block_diag(blocks))
-        return dense(matrix) if self.n_free <= DENSE_LIMIT else matrix
+        return dense(matrix) if self.n_free <= bulk.DENSE_LIMIT else matrix
 
     @cached_property
     def load(self) -> FloatArray:
@@ -527,5 +517,5 @@ class WholeScene(Scene):
         rows = []
         for body, free in zip(self._reached, self.unknowns, strict=True):
             nothing = (body.nodes.size,) * 2
-            rows.append(sparse.csr_array(nothing if body.rigid else assemble_stiffness(body)[0])[free])
+            rows.append(sparse.csr_array(nothing if body.rigid else bulk.assemble_stiffness(body)[0])[free])
         return tuple(rows)

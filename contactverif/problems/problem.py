@@ -15,15 +15,8 @@ from contactverif.contract.errors import MisuseError, describe_error, place_of_e
 from contactverif.contract.interface import PLANE
 from contactverif.contract.property import Quantity
 from contactverif.contract.traits import Traits
-from contactverif.mechanics.accuracy import (
-    Field,
-    Solution,
-    best_pressure_error,
-    displacement_error,
-    force_error,
-    pressure_error,
-    shape_integrals,
-)
+from contactverif.mechanics import accuracy
+from contactverif.mechanics.accuracy import Field, Solution
 from contactverif.mechanics.scene import Scene
 
 Errors = dict[str, float]  # {kind of error: number, dimensionless}; a kind that is not reported is not there.
@@ -76,7 +69,7 @@ class ProblemInstance:
     def best_pressure(self) -> float:
         """The error of the best continuous pressure that is linear between the slave's nodes, as `errors` counts it."""
         guess = self.first_guess
-        return best_pressure_error(guess.interface.slave, guess.positions, self._pressure, self.pressure_scale)
+        return accuracy.best_pressure_error(guess.interface.slave, guess.positions, self._pressure, self.pressure_scale)
 
     @property
     def _pressure(self) -> Field:
@@ -89,11 +82,12 @@ class ProblemInstance:
         positions = solution.state.positions if self.deformed else interface.nodes
         exact, errors = self.exact_forces(solution.state), {}
         for kind, surface in zip(FORCES, surfaces, strict=True):
-            errors[kind] = force_error(solution.forces, exact, shape_integrals(surface, positions))
+            errors[kind] = accuracy.force_error(solution.forces, exact, accuracy.shape_integrals(surface, positions))
         for kind, surface, motion in zip(MOTIONS, surfaces, self.motions, strict=False):
             checked = _check_field("motions", motion, "a vector for each place", interface.dim)
-            errors[kind] = displacement_error(surface, interface.nodes, solution.displacements, checked, self.parts)
-        pressure = pressure_error(solution, self._pressure, self.pressure_scale)
+            moves = interface.nodes, solution.displacements
+            errors[kind] = accuracy.displacement_error(surface, *moves, checked, self.parts)
+        pressure = accuracy.pressure_error(solution, self._pressure, self.pressure_scale)
         if pressure is not None:
             errors[PRESSURE] = pressure
         return errors | self.further(solution)

@@ -18,15 +18,7 @@ from contactverif.contract.case import Case, name_of_source
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.interface import PLANE, Interface
 from contactverif.contract.property import Outcome, Property
-from contactverif.sampling.hypothesis_draws import (
-    Draw,
-    draw_all,
-    draw_different,
-    find_difference,
-    one_thread,
-    reproducible,
-    shrink_case,
-)
+from contactverif.sampling import hypothesis_draws
 
 # A strategy, or a strategy for each kind of situation: the kinds take turns, so that each gets the same share.
 RandomSource = SearchStrategy[Case] | Mapping[str, SearchStrategy[Case]]
@@ -59,7 +51,7 @@ class Sampling:
             in_space = question.cases is question.cases_in_space
             if in_space is (self.interface.dim == PLANE) or (question.bodies and self.scene is None):
                 return None
-        with one_thread():
+        with hypothesis_draws.one_thread():
             return cast("CaseSource | None", question.cases(self.scene if question.bodies else self.interface))
 
     def key(self, question: Property) -> str:
@@ -112,7 +104,7 @@ def draw_cases(source: CaseSource, *, seed: str, examples: int) -> PlannedCases:
 
 def why_the_engine_draws() -> str:
     """Return why hypothesis' engine draws all cases, or an empty string: usually it draws those of few strategies."""
-    difference = find_difference()
+    difference = hypothesis_draws.find_difference()
     return f"{difference}, so its engine drew all cases" if difference else ""
 
 
@@ -175,13 +167,13 @@ def shrink(source: CaseSource, seed: str, examples: int, *, first: int, fails: C
         strategies = _strategies_in_turn(source)
         _, strategy = strategies[first % len(strategies)]
         choices = draws[first % BLOCK].stored_choices()
-        shrink_case(strategy, seed=seed, fails=fails, limit=SHRINK_CALLS, choices=choices)
+        hypothesis_draws.shrink_case(strategy, seed=seed, fails=fails, limit=SHRINK_CALLS, choices=choices)
         return
     parts, n, place = _parts(source, seed, examples), 0, first
     if len(parts) > 1:
-        n, place = _deal([draw_all(*part)[0] for part in parts])[first]
+        n, place = _deal([hypothesis_draws.draw_all(*part)[0] for part in parts])[first]
     strategy, own_seed, share = parts[n]
-    shrink_case(strategy, seed=own_seed, fails=fails, limit=SHRINK_CALLS, examples=share, first=place)
+    hypothesis_draws.shrink_case(strategy, seed=own_seed, fails=fails, limit=SHRINK_CALLS, examples=share, first=place)
 
 
 def check_names(cases: Sequence[Case]) -> None:
@@ -194,20 +186,20 @@ def check_names(cases: Sequence[Case]) -> None:
 
 def _draw_block(
     source: RandomSource, seed: str, examples: int, number: int, progress: Callable[[int], None] | None = None
-) -> list[Draw] | None:
+) -> list[hypothesis_draws.Draw] | None:
     """Return the cases of a block; None if hypothesis' engine must draw all blocks.
 
     A strategy with few different cases may run out. Only the engine knows whether it has more, so it draws all of them;
     where that shows late, the block is short.
     """
-    if find_difference():
+    if hypothesis_draws.find_difference():
         return None
     streams = [
-        draw_different(strategy, seed=f"{seed}/{kind}/{number}", simplest=number == 0)
+        hypothesis_draws.draw_different(strategy, seed=f"{seed}/{kind}/{number}", simplest=number == 0)
         for kind, strategy in _strategies_in_turn(source)
     ]
-    draws: list[Draw] = []
-    with reproducible():
+    draws: list[hypothesis_draws.Draw] = []
+    with hypothesis_draws.reproducible():
         for place in range(number * BLOCK, min(examples, (number + 1) * BLOCK)):
             draw = next(streams[place % len(streams)], None)
             if draw is None:
@@ -246,7 +238,7 @@ def _draw_with_engine(
     cases: list[tuple[Case, ...]] = []
     complete = True
     for strategy, own_seed, share in _parts(source, seed, examples):
-        part, exhausted = draw_all(strategy, own_seed, share, progress, sum(map(len, cases)))
+        part, exhausted = hypothesis_draws.draw_all(strategy, own_seed, share, progress, sum(map(len, cases)))
         cases.append(part)
         complete &= exhausted or len(part) == share
     return PlannedCases(tuple(cases[n][place] for n, place in _deal(cases)), complete)

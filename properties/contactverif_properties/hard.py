@@ -37,15 +37,7 @@ from contactverif.problems.blocks import pressure_of
 from contactverif.problems.open_states import activation_distance
 from contactverif.problems.uniform_stress import CONDITION_TOLERANCE, condition_tolerance
 from contactverif.strategies.beside import beside_cases
-from contactverif_properties import exact_forces, patch_solved, roundoff
-from contactverif_properties.applicability import (
-    LINEAR_BEGINNING,
-    LINEAR_FORCES,
-    knows_total,
-    law_is_linear,
-    may_act_twice,
-    refuse_dependent_multipliers,
-)
+from contactverif_properties import applicability, exact_forces, patch_solved, roundoff
 from contactverif_properties.newton_method import end_details
 from contactverif_properties.states import FrozenState
 
@@ -72,11 +64,12 @@ def measure_flat(case: Case, subject: Subject) -> Measurement:
     push = float((slave @ exact_forces.normal_of(case)).sum())
     broken, finding = "" if push > along else "nothing pushes the slave out of the master", None
     passes = traits.promises.patch.flat
-    if not (knows_total(traits) if passes is False else passes):  # A smoothed master, for one, bulges beside an edge.
+    # A smoothed master, for one, bulges beside an edge.
+    if not (applicability.knows_total(traits) if passes is False else passes):
         return Measurement(broken=broken)
     numbers = [ALONG.check(roundoff.ratio(along, float(np.abs(slave).sum())), tolerance)]
     whole = float(np.linalg.norm(exact[: len(slave)].sum(axis=0)))
-    if knows_total(traits):
+    if applicability.knows_total(traits):
         numbers.append(FLAT_TOTAL.check(abs(push / whole - 1), tolerance))
     if passes is not False:
         forces, largest = exact_forces.forces_of_gap(case, subject, exact)
@@ -225,7 +218,7 @@ def _measure_bounded(case: Case, subject: Subject, aside: float = 0.0) -> Measur
         outside = max(0.0, _outside(total, edges) - aside)
         numbers.append(DIRECTION.check(roundoff.ratio(outside, size), tolerance))
         # A master that is smoothed through its nodes bulges at a kink, and who states no rule for gaps may do that.
-        if knows_total(traits) and ((edges[0] == edges[1]).all() or traits.rules.gap is not None):
+        if applicability.knows_total(traits) and ((edges[0] == edges[1]).all() or traits.rules.gap is not None):
             numbers.append(TOTAL.check(max(0.0, bounds[0] - along, along - bounds[1]) / float(bounds[1]), tolerance))
     details = {"share of the upper bound": roundoff.ratio(along, float(bounds[1]))}
     # Where the lower bound is 0, no force is as good an answer as any.
@@ -262,7 +255,7 @@ _define_bounded = partial(Property.define, quantities=(DIRECTION, TOTAL, SIZE))
     id="hard.convex-kink",
     rank=340,
     cases=Cases.from_list(hard_corner_states.convex_kink_states),
-    linear=LINEAR_FORCES,
+    linear=applicability.LINEAR_FORCES,
 )
 def hard_convex_kink(case: Case, subject: Subject) -> Measurement:
     """A slave node that passes a convex master vertex within 1e-12 feels no wild force.
@@ -363,7 +356,7 @@ def _promise_no_wild_force(traits: Traits) -> bool | None:
     id="hard.steep-slave",
     rank=360,
     promise=_promise_no_wild_force,
-    linear=LINEAR_FORCES,
+    linear=applicability.LINEAR_FORCES,
     cases=Cases.from_list(hard_corner_states.steep_slave_states),
 )
 def hard_steep_slave(case: Case, subject: Subject) -> Measurement:
@@ -406,8 +399,8 @@ PULLING = Quantity("pull across the surface", "64 u X/ℓ + 4|g|/ℓ", "A spring
     rank=140,
     role="comparison",  # Springs of a wrong size fail here, too, and an exact answer says more of them.
     quantities=(FORCE, SLIDING, PRESSING, PULLING),
-    promise=law_is_linear,
-    linear=LINEAR_BEGINNING,
+    promise=applicability.law_is_linear,
+    linear=applicability.LINEAR_BEGINNING,
     cases=Cases.from_list(flat_states.touching_states),
     cases_in_space=Cases.from_list(flat_states.touching_face_states),
 )
@@ -470,9 +463,9 @@ def hard_touch(case: Case, subject: Subject) -> Measurement:
 def _all_springs(case: Case, traits: Traits) -> float:
     """Return the stiffness of all springs that the traits allow over ε̂ L, if each of them is closed."""
     interface, rules = case.interface, traits.rules
-    if knows_total(traits):
+    if applicability.knows_total(traits):
         return 1.0
-    n_nodes = interface.n_nodes if may_act_twice(traits) else interface.n_slave_nodes
+    n_nodes = interface.n_nodes if applicability.may_act_twice(traits) else interface.n_slave_nodes
     nodal = n_nodes / (len(interface.slave) if interface.dim == PLANE else interface.n_slave_nodes)
     distributed = 1 + float(interface.master.measures(case.positions).sum()) / case.slave_measure
     # Without a unit the penalty ε̂ may be taken for the stiffness of a node.
@@ -711,9 +704,9 @@ def _check_unloaded(
     quantities=(NO_STRESS, NO_FORCE),
     cases=Cases.from_list(block_scenes.unloaded_scenes),
     cases_in_space=Cases.from_list(space_scenes.unloaded_space_scenes),
-    promise=law_is_linear,
-    linear=LINEAR_BEGINNING,
-    applicable=refuse_dependent_multipliers,
+    promise=applicability.law_is_linear,
+    linear=applicability.LINEAR_BEGINNING,
+    applicable=applicability.refuse_dependent_multipliers,
 )
 def hard_zero_load(case: Case, subject: Subject) -> Measurement:
     """Two bodies that touch without a load stay without stress, wherever Newton's method starts.

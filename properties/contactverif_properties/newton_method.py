@@ -29,17 +29,9 @@ from contactverif.mechanics.scene import Scene, scene_of
 from contactverif.mechanics.system import ROUNDOFF_FACTOR, System
 from contactverif.strategies.solids import closed_cases, solid_cases
 from contactverif.strategies.space_solids import space_closed_cases, space_smooth_cases, space_solid_cases
-from contactverif_properties import applicability
+from contactverif_properties import applicability, roundoff
 from contactverif_properties.kinks import find_kink
-from contactverif_properties.roundoff import (
-    COORDINATE_ROUNDING,
-    MOST_ROUNDINGS,
-    Conditioning,
-    conditioning_of,
-    difference_quotient,
-    forces_quantity,
-    ratio,
-)
+from contactverif_properties.roundoff import COORDINATE_ROUNDING
 from contactverif_properties.states import FrozenState, random_directions
 
 # With a right tangent most solutions take fewer iterations. What takes more is found with differences as well, which
@@ -474,15 +466,15 @@ def _compare_step(
     if "tangent" not in system.formulation.provides:
         quotient = POSITION_ROUNDINGS * (UNIT_ROUNDOFF * largest / case.shortest_segment) ** (2 / 3) * step
     solved_to = STEP_ROUNDINGS * UNIT_ROUNDOFF * size
-    roundoff = max(ratio(solved_to, condition), POSITION_ROUNDINGS * UNIT_ROUNDOFF * largest)
-    return ratio(float(np.abs(difference / units).max()), roundoff + ratio(quotient, condition))
+    rounding = max(roundoff.ratio(solved_to, condition), POSITION_ROUNDINGS * UNIT_ROUNDOFF * largest)
+    return roundoff.ratio(float(np.abs(difference / units).max()), rounding + roundoff.ratio(quotient, condition))
 
 
 DIGITS = 32  # Coordinates are multiples of 2^-32 segments, so that the longest way rounds none.
 OFFSETS = (0, 5, 10, 15, 20)  # The ways: 2 to these powers, in segments.
 LOAD_SHARES = (1.0, 0.875, 0.75)  # If a jump of the forces leaves no solution under one load, another load has one.
 N_STEPS = 3  # From the solution near the origin, with the matrix there, a step leaves what roundoff does.
-ADDED = forces_quantity("roundings that the formulation adds")
+ADDED = roundoff.forces_quantity("roundings that the formulation adds")
 RESIDUAL = Quantity(
     "attained residual",
     "1 (times its roundoff)",
@@ -512,7 +504,7 @@ class Solution:
     # multipliers.
     terms: FloatArray
     # What roundings of the positions relative to one another may change in the contact forces.
-    conditioning: Conditioning
+    conditioning: roundoff.Conditioning
 
     def roundoff(self, largest: float) -> FloatArray:
         """Return the roundoff (n_free + n_multipliers,) of the residual where the largest coordinate is `largest`."""
@@ -587,7 +579,7 @@ def newton_attainable(case: Case, subject: Subject) -> Measurement:
     values = {ADDED: max(place.added for place in places)}
     if decided := [place for place in places if not place.undecided]:
         values |= {RESIDUAL: max(place.residual for place in decided), ERROR: max(place.error for place in decided)}
-    tolerances = {ADDED: MOST_ROUNDINGS, RESIDUAL: 1.0, ERROR: 1.0}
+    tolerances = {ADDED: roundoff.MOST_ROUNDINGS, RESIDUAL: 1.0, ERROR: 1.0}
     measurement = Measurement(check_all(values, tolerances), details=details, idle=is_untouched(trace))
     return measurement.after(f"solved, then moved by up to {segment * 2.0 ** OFFSETS[-1]:.4g}")
 
@@ -602,7 +594,7 @@ def examine(system: System, case: Case, u: FloatArray) -> Solution | None:
     state = FrozenState(system.formulation, case, system.pair(u))
     forces = state.residual
     to_unknowns = dense(system.transformation).T  # (n_free + n_multipliers, n_unknowns + n_multipliers)
-    derivative = difference_quotient(state)
+    derivative = roundoff.difference_quotient(state)
     rows = to_unknowns @ derivative
     matrix = dense(system.stiffness) + rows @ to_unknowns.T
     condition = system.step(matrix, np.zeros(system.size)).condition
@@ -621,7 +613,7 @@ def examine(system: System, case: Case, u: FloatArray) -> Solution | None:
         inverse=np.abs(linalg.inv(matrix)),
         contact=contact,
         terms=terms,
-        conditioning=conditioning_of(case, derivative, forces),
+        conditioning=roundoff.conditioning_of(case, derivative, forces),
     )
 
 
@@ -678,7 +670,7 @@ def _take_forces(solution: Solution, places: Sequence[_Place]) -> None:
         place.residual = near.balance(place.u, place.forces)
         largest = float(np.abs(place.z[:n]).max())
         sizes, floors = np.abs(place.residual).tolist(), solution.roundoff(largest).tolist()
-        place.rests.append((max(map(ratio, sizes, floors), default=0.0), place.u, largest, place.pairing))
+        place.rests.append((max(map(roundoff.ratio, sizes, floors), default=0.0), place.u, largest, place.pairing))
 
 
 def _attain(solution: Solution, case: Case, place: _Place) -> _Attained:
@@ -690,4 +682,4 @@ def _attain(solution: Solution, case: Case, place: _Place) -> _Attained:
     if pairing != solution.pairing or pairing is None:
         state = replace(case, interface=near.scene.interface, z=near.state(u), n_multipliers=near.n_multipliers)
         undecided = find_kink(FrozenState(near.formulation, state, near.pair(u)), COORDINATE_ROUNDING * largest)
-    return _Attained(place.added, residual, ratio(length, allowed), length, undecided)
+    return _Attained(place.added, residual, roundoff.ratio(length, allowed), length, undecided)

@@ -22,25 +22,9 @@ from contactverif.oracle.flat_answers import nodal_spring_weights, nodal_surface
 from contactverif.problems.flat_states import equal_area_states, equal_length_states
 from contactverif.problems.named_states import FLAT_NAMES, named_case
 from contactverif.problems.own_law import fit_to_law
-from contactverif.strategies import flat_cases, normal_cases, overhung_cases, single_cases, surfaces
-from contactverif.strategies.straight import (
-    slight_cases,
-    steep_cases,
-    steep_plane_cases,
-    tilted_cases,
-    tilted_plane_cases,
-)
-from contactverif_properties import exact_forces, roundoff
-from contactverif_properties.applicability import (
-    LINEAR_FORCES,
-    LINEAR_SIZE,
-    knows_total,
-    may_act_twice,
-    promise_normal,
-    promise_single,
-    refuse_unknown_total,
-    refuse_unstated,
-)
+from contactverif.strategies import flat_cases, normal_cases, overhung_cases, single_cases, straight, surfaces
+from contactverif_properties import applicability, exact_forces, roundoff
+from contactverif_properties.applicability import knows_total, refuse_unstated
 from contactverif_properties.kinks import explain_by_kink
 from contactverif_properties.states import FrozenState
 
@@ -113,8 +97,8 @@ def patch_flat_transmission(case: Case, subject: Subject) -> Measurement:
     quantities=(TOTAL,),
     cases=Cases.random(flat_cases),
     cases_in_space=Cases.random(surfaces.flat_surface_cases),
-    promise=lambda traits: None if refuse_unknown_total(traits) else True,
-    applicable=refuse_unknown_total,
+    promise=lambda traits: None if applicability.refuse_unknown_total(traits) else True,
+    applicable=applicability.refuse_unknown_total,
     usual_undecided=WITHOUT_TOLERANCE,
 )
 def patch_flat_resultant(case: Case, subject: Subject) -> Measurement:
@@ -216,7 +200,7 @@ _define_class = partial(_define_uniform, quantities=(FORCE, GAP, PRESSURE))
     turn=3,
     cases=Cases.random(normal_cases),
     cases_in_space=Cases.random(surfaces.matched_surface_cases),
-    promise=promise_normal,
+    promise=applicability.promise_normal,
 )
 def patch_flat_normal(case: Case, subject: Subject) -> Measurement:
     """Forces, gaps and pressures are exact on flat meshes with each inner master node on a slave node.
@@ -245,7 +229,7 @@ def patch_flat_normal(case: Case, subject: Subject) -> Measurement:
     return _measure_class(case, subject)
 
 
-@_define_class(id="patch.flat.single", rank=200, cases=Cases.random(single_cases), promise=promise_single)
+@_define_class(id="patch.flat.single", rank=200, cases=Cases.random(single_cases), promise=applicability.promise_single)
 def patch_flat_single(case: Case, subject: Subject) -> Measurement:
     """They are exact too where inner master nodes lie in the middle of slave segments.
 
@@ -325,7 +309,7 @@ def patch_flat_nodal(case: Case, subject: Subject) -> Measurement:
     rank=290,
     quantities=(STATED,),
     cases=Cases.from_list(lambda: tuple(map(named_case, FLAT_NAMES))),
-    linear=LINEAR_FORCES,
+    linear=applicability.LINEAR_FORCES,
     promise=lambda traits: True if traits.evidence.published_forces else None,
     applicable=lambda traits: "" if traits.evidence.published_forces else "the traits state no forces of named cases",
     least_contact=0.0,  # Nothing is asked on a case of which nothing is stated, and one table is better than none.
@@ -413,7 +397,7 @@ PUSH = Quantity(
     cases=Cases.from_list(equal_length_states),
     cases_in_space=Cases.from_list(equal_area_states),
     asks=frozenset({"penalty"}),
-    linear=LINEAR_SIZE,
+    linear=applicability.LINEAR_SIZE,
 )
 def total_stiffness(case: Case, subject: Subject) -> Measurement:
     """The total contact stiffness of a flat interface is ε̂ L, or 2 ε̂ L with two passes.
@@ -451,7 +435,7 @@ def total_stiffness(case: Case, subject: Subject) -> Measurement:
     details = {"springs over ε̂ L": springs}
     if abs(shallow - springs) > 2 * tolerance * abs(springs) and traits.rules.law != "linear":
         return Measurement(details=details)
-    passes = 2 if springs > np.sqrt(2) and may_act_twice(traits) else 1
+    passes = 2 if springs > np.sqrt(2) and applicability.may_act_twice(traits) else 1
     numbers = [
         MOST.check(max(springs, opposite), passes * (1 + 1 / n) + tolerance),
         LEAST.check(min(springs, opposite), passes * (1 - 1 / n) - tolerance),
@@ -459,7 +443,7 @@ def total_stiffness(case: Case, subject: Subject) -> Measurement:
     ]
     remark = "" if passes == 1 or traits.promises.unbiased else "two passes, or twice too stiff"
     if any(number.ratio > 1 for number in numbers):
-        remark = "one pass has 1 ε̂ L" + (", two passes have 2 ε̂ L" if may_act_twice(traits) else "")
+        remark = "one pass has 1 ε̂ L" + (", two passes have 2 ε̂ L" if applicability.may_act_twice(traits) else "")
         if abs(opposite - springs) > abs(springs) / n:
             remark = f"the master gets {opposite:#.3g} ε̂ L; {remark}"
     finding = Finding(f"your springs are {springs:#.3g} ε̂ L: {remark}") if remark else None
@@ -485,7 +469,7 @@ STEEPEST_SEEN = 0.5  # The cosine of 60°, up to which half passes see a slave, 
 
 @random_source("contactverif_properties.straight_slaves.resultant_cases")
 def _resultant_cases(interface: Interface | None = None) -> dict[str, SearchStrategy[Case]] | None:
-    makers = {TILTED: tilted_cases, STEEP: steep_cases, SLIGHT: slight_cases}
+    makers = {TILTED: straight.tilted_cases, STEEP: straight.steep_cases, SLIGHT: straight.slight_cases}
     return {kind: cases for kind, make in makers.items() if (cases := make(interface)) is not None} or None
 
 
@@ -493,7 +477,7 @@ def _resultant_cases(interface: Interface | None = None) -> dict[str, SearchStra
 def _resultant_plane_cases(
     interface: Interface | None = None, faces: tuple[int, ...] = (TRIANGLE,)
 ) -> dict[str, SearchStrategy[Case]] | None:
-    tilted, steep = tilted_plane_cases(interface, faces), steep_plane_cases(interface, faces)
+    tilted, steep = straight.tilted_plane_cases(interface, faces), straight.steep_plane_cases(interface, faces)
     return {TILTED_PLANE: tilted, STEEP_PLANE: steep} if tilted is not None and steep is not None else None
 
 
@@ -579,10 +563,10 @@ def _refuse_unknown_integral(traits: Traits) -> str:
     rank=395,
     role="trait",
     quantities=(TILTED_NODAL,),
-    cases=Cases.random(tilted_cases),
-    cases_in_space=Cases.random(tilted_plane_cases),
+    cases=Cases.random(straight.tilted_cases),
+    cases_in_space=Cases.random(straight.tilted_plane_cases),
     promise=lambda traits: traits.promises.integrates_linear_gap,
-    linear=LINEAR_FORCES,
+    linear=applicability.LINEAR_FORCES,
     applicable=_refuse_unknown_integral,
 )
 def patch_tilted_nodal(case: Case, subject: Subject) -> Measurement:
@@ -617,8 +601,8 @@ def _refuse_unknown_shapes(traits: Traits) -> str:
     id="patch.tilted.weighted",
     rank=36,
     quantities=(TILTED_NODAL, TILTED_ROW),
-    cases=Cases.random(tilted_cases),
-    cases_in_space=Cases.random(tilted_plane_cases),
+    cases=Cases.random(straight.tilted_cases),
+    cases_in_space=Cases.random(straight.tilted_plane_cases),
     applicable=_refuse_unknown_shapes,
 )
 def patch_tilted_weighted(case: Case, subject: Subject) -> Measurement:

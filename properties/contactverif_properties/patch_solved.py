@@ -29,13 +29,8 @@ from contactverif.problems import own_law
 from contactverif.problems.block_scenes import normal_scenes, single_scenes
 from contactverif.problems.blocks import exact_unknowns, pressure_of
 from contactverif.problems.uniform_stress import PRESSURE_TOLERANCE, STRESS_TOLERANCE, stress_error, uniform_tolerances
+from contactverif.strategies import space_solids
 from contactverif.strategies.solids import UNIFORM, block_cases, dead_zone_cases, variant_cases
-from contactverif.strategies.space_solids import (
-    space_block_cases,
-    space_dead_zone_cases,
-    space_matched_cases,
-    space_variant_cases,
-)
 from contactverif_properties import exact_forces
 from contactverif_properties.applicability import promise_normal, promise_single
 from contactverif_properties.newton_method import end_details
@@ -386,7 +381,7 @@ _define_at_two_penalties = partial(_define, quantities=(*QUANTITIES, *map(_at_hi
     id="patch.flat.solve",
     rank=675,
     cases=Cases.random(block_cases),
-    cases_in_space=Cases.random(space_block_cases),
+    cases_in_space=Cases.random(space_solids.space_block_cases),
     promise=lambda traits: traits.promises.patch.flat,
 )
 def patch_flat_solve(case: Case, subject: Subject) -> Measurement:
@@ -418,7 +413,7 @@ def patch_flat_solve(case: Case, subject: Subject) -> Measurement:
     id="patch.flat.normal.solve",
     rank=605,
     cases=_scenes_of_class(normal_scenes, midpoints=False),
-    cases_in_space=Cases.random(space_matched_cases),
+    cases_in_space=Cases.random(space_solids.space_matched_cases),
     promise=promise_normal,
 )
 def patch_flat_normal_solve(case: Case, subject: Subject) -> Measurement:
@@ -475,7 +470,7 @@ def patch_flat_single_solve(case: Case, subject: Subject) -> Measurement:
     rank=680,
     quantities=(*QUANTITIES, MULTIPLIERS),
     cases=Cases.random(variant_cases),
-    cases_in_space=Cases.random(space_variant_cases),
+    cases_in_space=Cases.random(space_solids.space_variant_cases),
     promise=lambda traits: traits.promises.patch.flat,
 )
 def patch_variants(case: Case, subject: Subject) -> Measurement:
@@ -504,7 +499,7 @@ def _widen_tolerance(quantity: Quantity) -> Quantity:
     rank=620,
     quantities=tuple(map(_widen_tolerance, (*QUANTITIES, MULTIPLIERS))),
     cases=Cases.random(dead_zone_cases),
-    cases_in_space=Cases.random(space_dead_zone_cases),
+    cases_in_space=Cases.random(space_solids.space_dead_zone_cases),
     promise=lambda traits: traits.promises.patch.overhang,
 )
 def patch_dead_zone(case: Case, subject: Subject) -> Measurement:

@@ -56,7 +56,9 @@ def test_the_merged_report_is_that_of_one_run(
     ask: Ask, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, in_blocks: bool
 ) -> None:
     """It is so, too, where hypothesis' engine draws all cases at once, and for a shard that was killed."""
-    monkeypatch.setattr("contactverif.sampling.draw.find_difference", lambda: "" if in_blocks else "another version")
+    monkeypatch.setattr(
+        "contactverif.sampling.hypothesis_draws.find_difference", lambda: "" if in_blocks else "another version"
+    )
     single = ask(f"verify {WORDS} --out", tmp_path / "single.nc")
     shards = tmp_path / "shards"
     for number in (3, 1, 2):

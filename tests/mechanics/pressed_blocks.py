@@ -9,7 +9,6 @@ from subjects import load_subject
 
 from contactverif import Body, CheckedFormulation, Scene, Trace, solve
 from contactverif.mechanics import bulk
-from contactverif.mechanics import scene as scene_module
 
 ALL = ("nts", "nts-ar", "vts-g", "vts-me", "vts-ppt", "vts-ppt-basic", "vts-ppt-balanced")
 LEANING = (cos(radians(17.3)), sin(radians(17.3)))
@@ -30,6 +29,5 @@ def in_triangles(body: Body) -> Body:
 
 def make_sparse(monkeypatch: pytest.MonkeyPatch, full: float = inf) -> None:
     """Make small scenes sparse as large ones are; from the share `full` of entries on, the stiffness stays dense."""
-    monkeypatch.setattr(scene_module, "DENSE_LIMIT", 0)
     monkeypatch.setattr(bulk, "DENSE_LIMIT", 0)
-    monkeypatch.setattr(scene_module, "DENSE_SHARE", full)
+    monkeypatch.setattr(bulk, "DENSE_SHARE", full)

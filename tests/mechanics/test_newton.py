@@ -18,8 +18,7 @@ from subjects import Changed, change_verbs, load_subject
 from contactverif import CheckedFormulation, End, Interface, Rectangle, Scene, Subject, Trace, Traits, solve, two_blocks
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray
 from contactverif.contract.errors import MisuseError, PluginError
-from contactverif.mechanics import linear
-from contactverif.mechanics import scene as scene_module
+from contactverif.mechanics import bulk, linear
 from contactverif.mechanics.system import System
 from contactverif.problems import catalogue
 
@@ -351,7 +350,7 @@ def test_sparse_and_dense_agree(name: str, stiffness: str, monkeypatch: pytest.M
     scene = catalogue.make_scene("c", **options)
     dense = solve_named(name, scene)
     bound = rounding_at(dense, on(name, scene))
-    make_sparse(monkeypatch, scene_module.DENSE_SHARE if stiffness == "full" else inf)
+    make_sparse(monkeypatch, bulk.DENSE_SHARE if stiffness == "full" else inf)
     large = catalogue.make_scene("c", **options)
     trace = solve_named(name, large)
     check_trace(trace, large)

@@ -598,6 +598,8 @@ def test_a_stored_case_is_judged_again() -> None:
 
 def test_a_run_says_where_the_engine_of_hypothesis_drew_all_cases(monkeypatch: pytest.MonkeyPatch) -> None:
     assert "drawing" not in run([subject()], [ZERO], examples=2, seed=1).provenance
-    monkeypatch.setattr("contactverif.sampling.draw.find_difference", lambda: "hypothesis 7 draws otherwise")
+    monkeypatch.setattr(
+        "contactverif.sampling.hypothesis_draws.find_difference", lambda: "hypothesis 7 draws otherwise"
+    )
     facts = run([subject()], [ZERO], examples=2, seed=1).provenance
     assert facts["drawing"] == "hypothesis 7 draws otherwise, so its engine drew all cases"

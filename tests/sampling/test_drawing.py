@@ -169,7 +169,7 @@ def test_a_run_of_many_cases_keeps_few_of_them() -> None:
 def test_without_the_inside_of_hypothesis_its_engine_draws_and_shrinks(
     monkeypatch: pytest.MonkeyPatch, source: Any
 ) -> None:
-    monkeypatch.setattr("contactverif.sampling.draw.find_difference", lambda: "another version")
+    monkeypatch.setattr("contactverif.sampling.hypothesis_draws.find_difference", lambda: "another version")
     planned = draw_cases(source, seed="1", examples=40)
     assert len(planned.cases) == 40
     judged: list[Case] = []
