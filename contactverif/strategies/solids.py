@@ -4,9 +4,9 @@ Lengths are small integers, E and scales powers of two times small integers; all
 ν = 0, no motion. Penalties come as ε̂ h / E, so that "moderate" means the same for every mesh.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 from itertools import accumulate, takewhile
 from math import ldexp
 
@@ -53,51 +53,25 @@ def _widths() -> SearchStrategy[list[float]]:
     return st.one_of(plain, plain, plain, plain, wide)
 
 
-@random_source("contactverif.strategies.solids.block_cases", needs=UNIFORM)
-def block_cases(scene: Case | None = None) -> SearchStrategy[Case] | None:
-    """Return two random blocks of equal width under an imposed approach: a uniform pressure that is known exactly.
+def on_scene(
+    cases: Callable[..., SearchStrategy[Case]], name: str, fits: Callable[[Case], bool] = has_bodies, needs: str = ""
+) -> Callable[..., SearchStrategy[Case] | None]:
+    """Return a function that makes these cases, with a stored name; given a scene, that scene alone if it fits.
 
-    Given a scene, that scene alone; None if its pressure is not known, or the slave overhangs the master.
+    In space it takes the numbers of corners that a face may have, too.
     """
-    return _two_blocks() if scene is None else _uniform(scene, overhang=False)
 
+    def make(scene: Case | None = None, *faces: tuple[int, ...]) -> SearchStrategy[Case] | None:
+        if scene is None:
+            return cases(*faces)
+        return st.just(scene) if has_bodies(scene) and fits(scene) else None
 
-@random_source("contactverif.strategies.solids.variant_cases", needs=UNIFORM)
-def variant_cases(scene: Case | None = None) -> SearchStrategy[Case] | None:
-    """Return scenes as `block_cases` does, the patch test's variants: "variant" is an index into VARIANTS."""
-    return _variants() if scene is None else _uniform(scene, overhang=False)
-
-
-@random_source("contactverif.strategies.solids.dead_zone_cases", needs="a known pressure and an overhang")
-def dead_zone_cases(scene: Case | None = None) -> SearchStrategy[Case] | None:
-    """Return scenes as `block_cases` does whose slave overhangs its master inside a segment, on one side or both."""
-    return _dead_zones() if scene is None else _uniform(scene, overhang=True)
-
-
-@random_source("contactverif.strategies.solids.solid_cases")
-def solid_cases(scene: Case | None = None) -> SearchStrategy[Case] | None:
-    """Return a tilted block on a wider one, off the lattice: pressure and gaps vary, and few states are at a kink.
-
-    Given a scene, that scene alone.
-    """
-    if scene is None:
-        return _tilted_blocks(_TILTS)
-    return st.just(scene) if has_bodies(scene) else None
-
-
-@random_source("contactverif.strategies.solids.closed_cases")
-def closed_cases(scene: Case | None = None) -> SearchStrategy[Case] | None:
-    """Return scenes as `solid_cases` does, all of the interface in contact: for what has nothing to do with opening."""
-    return _tilted_blocks(_CLOSED_TILTS) if scene is None else solid_cases(scene)
-
-
-def _uniform(scene: Case, *, overhang: bool) -> SearchStrategy[Case] | None:
-    fits = has_bodies(scene) and is_uniform(scene) and overhangs(scene) == overhang
-    return st.just(scene) if fits else None
+    return random_source(f"contactverif.strategies.{name}", needs)(make)
 
 
 @st.composite
 def _two_blocks(draw: DrawFn) -> Case:
+    """Draw two blocks of equal width under an imposed approach: a uniform pressure that is known exactly."""
     slave, master = draw(_widths()), draw(_widths())
     layers = draw(_LAYERS), draw(_LAYERS)
     young, poisson = (draw(MODULI), draw(MODULI)), (draw(POISSON), draw(POISSON))
@@ -108,6 +82,7 @@ def _two_blocks(draw: DrawFn) -> Case:
 
 @st.composite
 def _variants(draw: DrawFn) -> Case:
+    """Draw scenes as `_two_blocks` does, the patch test's variants: "variant" is an index into VARIANTS."""
     variant = draw(_VARIANTS)
     slave, master = draw(lengths(graded=False)), draw(lengths(graded=False))
     layers = draw(_LAYERS), draw(_LAYERS)
@@ -139,6 +114,7 @@ def _variants(draw: DrawFn) -> Case:
 
 @st.composite
 def _dead_zones(draw: DrawFn) -> Case:
+    """Draw scenes as `_two_blocks` does whose slave overhangs its master inside a segment, on one side or both."""
     x, (left, right) = ends_of(draw(_widths())), draw(_OVERHANGS)
     segments = np.diff(x)
     first = draw(st.integers(0, len(segments) - 1)) if left > 0 else 0
@@ -159,6 +135,7 @@ def _dead_zones(draw: DrawFn) -> Case:
 
 @st.composite
 def _tilted_blocks(draw: DrawFn, tilts: SearchStrategy[int]) -> Case:
+    """Draw a tilted block on a wider one, off the lattice: pressure and gaps vary, and few states are at a kink."""
     slave, master = draw(lengths(graded=False)), draw(lengths(graded=False))
     layers = draw(_LAYERS), draw(_LAYERS)
     young, poisson = (draw(MODULI), draw(MODULI)), (draw(POISSON), draw(POISSON))
@@ -172,6 +149,23 @@ def _tilted_blocks(draw: DrawFn, tilts: SearchStrategy[int]) -> Case:
     master_x = _cut(master, x[-1] + 4) - 1
     scene = _scene(moved, master_x, layers, young, poisson, motion, strain=strain, tilt=tilt / 13, stiff=stiff)
     return scene.case(seed=seed)
+
+
+def _is_covered(scene: Case) -> bool:
+    return is_uniform(scene) and not overhangs(scene)
+
+
+block_cases = on_scene(_two_blocks, "solids.block_cases", _is_covered, UNIFORM)
+variant_cases = on_scene(_variants, "solids.variant_cases", _is_covered, UNIFORM)
+dead_zone_cases = on_scene(
+    _dead_zones,
+    "solids.dead_zone_cases",
+    lambda scene: is_uniform(scene) and overhangs(scene),
+    "a known pressure and an overhang",
+)
+solid_cases = on_scene(partial(_tilted_blocks, _TILTS), "solids.solid_cases")
+# All of the interface is in contact: for what has nothing to do with opening.
+closed_cases = on_scene(partial(_tilted_blocks, _CLOSED_TILTS), "solids.closed_cases")
 
 
 def _scene(

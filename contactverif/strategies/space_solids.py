@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -9,9 +10,9 @@ from hypothesis import strategies as st
 from hypothesis.strategies import DrawFn, SearchStrategy
 
 from contactverif.contract.arrays import FloatArray
-from contactverif.contract.case import Case, random_source
+from contactverif.contract.case import Case
 from contactverif.contract.interface import TRIANGLE, Interface
-from contactverif.mechanics.scene import Scene, has_bodies
+from contactverif.mechanics.scene import Scene
 from contactverif.problems.blocks import is_uniform
 from contactverif.problems.catalogue import MODERATE_PENALTY
 from contactverif.problems.flat_states import SpaceMotion
@@ -19,6 +20,7 @@ from contactverif.problems.space_blocks import space_blocks
 from contactverif.strategies import samples, solids
 from contactverif.strategies.surfaces import SurfacePair, matched_pairs, space_motions, surface_grids, surface_pairs
 
+Faces = tuple[int, ...]  # The numbers of corners that a face may have.
 VARIANTS = ("rigid master", "unequal materials", "punch")
 MOST_CELLS = 4  # Along each side of a block.
 _LAYERS = st.lists(st.sampled_from([0.5, 0.25, 1.0]), min_size=1, max_size=2)
@@ -27,30 +29,11 @@ _POISSON = st.tuples(solids.POISSON, solids.POISSON)
 _YOUNG = st.tuples(solids.MODULI, solids.MODULI)
 
 
-def _on_scene(
-    draw_scene: Callable[[DrawFn, tuple[int, ...]], Case], name: str, *, uniform: bool = True
-) -> Callable[..., SearchStrategy[Case] | None]:
-    """Return the cases of a function that draws one on some faces; given a scene, that scene alone if it fits."""
-    cases = st.composite(draw_scene)
-
-    def make(scene: Case | None = None, faces: tuple[int, ...] = (TRIANGLE,)) -> SearchStrategy[Case] | None:
-        if scene is None:
-            return cases(faces)
-        return st.just(scene) if has_bodies(scene) and (is_uniform(scene) or not uniform) else None
-
-    return random_source(f"contactverif.strategies.space_solids.{name}", solids.UNIFORM if uniform else "")(make)
-
-
-def _draw_blocks(draw: DrawFn, faces: tuple[int, ...]) -> Case:
-    return _press(draw, surface_pairs(most=MOST_CELLS, stretched=False, faces=faces, straight=True))
-
-
-def _draw_matched(draw: DrawFn, faces: tuple[int, ...]) -> Case:
-    return _press(draw, matched_pairs(faces, stretched=False))
-
-
-def _press(draw: DrawFn, pairs: SearchStrategy[SurfacePair]) -> Case:
-    pair, layers, young, poisson = draw(pairs), draw(_BOTH_LAYERS), draw(_YOUNG), draw(_POISSON)
+@st.composite
+def _flat_blocks(
+    draw: DrawFn, pairs_on: Callable[[Faces], SearchStrategy[SurfacePair]], faces: Faces = (TRIANGLE,)
+) -> Case:
+    pair, layers, young, poisson = draw(pairs_on(faces)), draw(_BOTH_LAYERS), draw(_YOUNG), draw(_POISSON)
     strain, motion, seed = draw(solids.STRAINS), draw(space_motions(furthest=16)), draw(samples.SEEDS)
     return _scene(pair.lay_out(), layers, young, poisson, motion, strain=strain).case(seed=seed)
 
@@ -58,7 +41,8 @@ def _press(draw: DrawFn, pairs: SearchStrategy[SurfacePair]) -> Case:
 _ENDS = st.tuples(*[st.integers(1, 13)] * 2)  # Fourteenths of the slave's side at which the master begins and ends.
 
 
-def _draw_dead_zones(draw: DrawFn, faces: tuple[int, ...]) -> Case:
+@st.composite
+def _dead_zones(draw: DrawFn, faces: Faces = (TRIANGLE,)) -> Case:
     grids = surface_grids(most=MOST_CELLS, faces=faces, straight=True)
     slave, master, sides = draw(grids), draw(grids), np.array([draw(_ENDS), draw(_ENDS)]) / 14
     layers, young, poisson = draw(_BOTH_LAYERS), draw(_YOUNG), draw(_POISSON)
@@ -74,8 +58,9 @@ def _draw_dead_zones(draw: DrawFn, faces: tuple[int, ...]) -> Case:
     return _scene(surfaces, layers, young, poisson, motion, pressure=pressure).case(seed=seed)
 
 
-def _draw_variants(draw: DrawFn, faces: tuple[int, ...]) -> Case:
-    variant = draw(_VARIANTS)
+@st.composite
+def _variants(draw: DrawFn, faces: Faces = (TRIANGLE,)) -> Case:
+    variant = draw(_NUMBERS)
     name = VARIANTS[variant]
     pairs = surface_pairs(same_domain=name != "punch", most=MOST_CELLS, stretched=False, faces=faces, straight=True)
     pair, layers, poisson = draw(pairs), draw(_BOTH_LAYERS), draw(_POISSON)
@@ -88,7 +73,7 @@ def _draw_variants(draw: DrawFn, faces: tuple[int, ...]) -> Case:
     return replace(scene, facts={**scene.facts, "variant": np.array(float(variant))}).case(seed=seed)
 
 
-_VARIANTS = st.integers(0, len(VARIANTS) - 1)
+_NUMBERS = st.integers(0, len(VARIANTS) - 1)
 _CONTRASTS = st.integers(-6, 6)
 # Thirteenths of the approach over the side, along both axes: all of the interface is in contact, or a part.
 _CLOSED_SLOPES = st.tuples(*[st.sampled_from([1, 2, 3, -1, -2, -3])] * 2)
@@ -96,27 +81,34 @@ _SLOPES = st.tuples(*[st.sampled_from([1, 2, 3, -5, 8, 13, -16, 20])] * 2)
 _BUMPS = st.sampled_from([0.0, 0.03, 0.06])
 
 
-def _tilt(slopes: SearchStrategy[tuple[int, ...]], most: int = 3) -> Callable[[DrawFn, tuple[int, ...]], Case]:
-    def draw_case(draw: DrawFn, faces: tuple[int, ...]) -> Case:
-        pairs = surface_pairs(same_domain=False, most=most, stretched=False, faces=faces, straight=True)
-        pair, layers, young, poisson = draw(pairs), draw(_BOTH_LAYERS), draw(_YOUNG), draw(_POISSON)
-        exponent, motion, seed = draw(solids.TILTED_STRAINS), draw(space_motions(furthest=16)), draw(samples.SEEDS)
-        tilt, stiff, bump = draw(slopes), draw(solids.STIFF), draw(_BUMPS)
-        strain = 2.0 ** -min(exponent, solids.SMALLEST_STRAIN.get(stiff, exponent))
-        load: dict[str, Any] = {"strain": strain, "slopes": tilt, "stiff": stiff, "bump": bump}
-        return _scene(pair.lay_out(), layers, young, poisson, motion, **load).case(seed=seed)
+@st.composite
+def _tilted_blocks(
+    draw: DrawFn, slopes: SearchStrategy[tuple[int, ...]], most: int, faces: Faces = (TRIANGLE,)
+) -> Case:
+    pairs = surface_pairs(same_domain=False, most=most, stretched=False, faces=faces, straight=True)
+    pair, layers, young, poisson = draw(pairs), draw(_BOTH_LAYERS), draw(_YOUNG), draw(_POISSON)
+    exponent, motion, seed = draw(solids.TILTED_STRAINS), draw(space_motions(furthest=16)), draw(samples.SEEDS)
+    tilt, stiff, bump = draw(slopes), draw(solids.STIFF), draw(_BUMPS)
+    strain = 2.0 ** -min(exponent, solids.SMALLEST_STRAIN.get(stiff, exponent))
+    load: dict[str, Any] = {"strain": strain, "slopes": tilt, "stiff": stiff, "bump": bump}
+    return _scene(pair.lay_out(), layers, young, poisson, motion, **load).case(seed=seed)
 
-    return draw_case
+
+def _pairs(faces: Faces) -> SearchStrategy[SurfacePair]:
+    return surface_pairs(most=MOST_CELLS, stretched=False, faces=faces, straight=True)
 
 
-space_block_cases = _on_scene(_draw_blocks, "space_block_cases")
-space_matched_cases = _on_scene(_draw_matched, "space_matched_cases")
-space_dead_zone_cases = _on_scene(_draw_dead_zones, "space_dead_zone_cases")
-space_variant_cases = _on_scene(_draw_variants, "space_variant_cases")
-space_solid_cases = _on_scene(_tilt(_SLOPES), "space_solid_cases", uniform=False)
-space_closed_cases = _on_scene(_tilt(_CLOSED_SLOPES), "space_closed_cases", uniform=False)
+_uniform = partial(solids.on_scene, fits=is_uniform, needs=solids.UNIFORM)
+space_block_cases = _uniform(partial(_flat_blocks, _pairs), "space_solids.space_block_cases")
+space_matched_cases = _uniform(
+    partial(_flat_blocks, partial(matched_pairs, stretched=False)), "space_solids.space_matched_cases"
+)
+space_dead_zone_cases = _uniform(_dead_zones, "space_solids.space_dead_zone_cases")
+space_variant_cases = _uniform(_variants, "space_solids.space_variant_cases")
+space_solid_cases = solids.on_scene(partial(_tilted_blocks, _SLOPES, 3), "space_solids.space_solid_cases")
+space_closed_cases = solids.on_scene(partial(_tilted_blocks, _CLOSED_SLOPES, 3), "space_solids.space_closed_cases")
 # Few points, so that few of them are near a kink.
-space_smooth_cases = _on_scene(_tilt(_CLOSED_SLOPES, most=2), "space_smooth_cases", uniform=False)
+space_smooth_cases = solids.on_scene(partial(_tilted_blocks, _CLOSED_SLOPES, 2), "space_solids.space_smooth_cases")
 
 
 def _scene(
