@@ -88,20 +88,6 @@ class PlannedCases:
     last: bool = True  # No further block follows.
 
 
-def draw_cases(source: CaseSource, *, seed: str, examples: int) -> PlannedCases:
-    """Draw all planned cases; the first is the simplest that the strategy makes. Kinds follow one another in turn.
-
-    A case that a strategy filters out is not counted. There are fewer if the strategy has fewer.
-    """
-    cases: list[Case] = []
-    for number in range(number_of_blocks(examples)):
-        block = draw_block(source, seed=seed, examples=examples, number=number)
-        cases += block.cases
-        if block.last:
-            break
-    return PlannedCases(tuple(cases), block.exhausted)
-
-
 def why_the_engine_draws() -> str:
     """Return why hypothesis' engine draws all cases, or an empty string: usually it draws those of few strategies."""
     difference = hypothesis_draws.find_difference()
@@ -140,7 +126,7 @@ def draws_blocks(source: CaseSource, seed: str, examples: int) -> bool:
 
 
 def draw_case(source: CaseSource, seed: str, examples: int, *, number: int) -> Case:
-    """Return the case with this number of those of `draw_cases`."""
+    """Return the case with this number among those of all blocks."""
     if isinstance(source, tuple):
         return source[number]
     draws = _draw_block(source, seed, examples, number // BLOCK)

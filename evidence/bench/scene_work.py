@@ -26,7 +26,7 @@ from contactverif import Case, Property, Subject, judge_case, load_formulation, 
 from contactverif.mechanics import bulk
 from contactverif.mechanics.scene import Scene, forget_bodies, has_bodies
 from contactverif.mechanics.system import System
-from contactverif.sampling.draw import draw_cases
+from contactverif.sampling.draw import draw_block
 
 
 @dataclass(frozen=True)
@@ -109,7 +109,7 @@ def size_of(case: Case) -> tuple[bool, int]:
 
 def measure_work(question: Property, subject: Subject) -> Work:
     """Ask a property on the largest of some cases and return what was done."""
-    case = max(draw_cases(question.cases(None), seed="0", examples=20).cases[:20], key=size_of)
+    case = max(draw_block(question.cases(None), seed="0", examples=20, number=0).cases[:20], key=size_of)
     forget_everything()
     with count_all() as counts:
         judge_case(question, case, subject)

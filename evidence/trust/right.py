@@ -17,6 +17,7 @@ from itertools import combinations, product
 
 from every_formulation import FORMULATIONS
 from expected_verdicts import FAILS
+from planned_cases import draw_cases
 from tables import fill_all
 from zoo.killing import properties
 from zoo.right import STRANGERS
@@ -25,7 +26,6 @@ from contactverif import Case, Property, Row, Subject, Verdict, judge_case, load
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.property import checked_numbers
 from contactverif.run.run import run
-from contactverif.sampling.draw import draw_cases
 
 CAMPAIGN, STRANGERS_FILE, OPTIONS, FACES = "campaign.csv", "strangers.csv", "options.csv", "faces.csv"
 EXAMPLES = {1: 60, 2: 30}  # {seed: random cases of each property and built-in formulation}

@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from matplotlib.figure import Figure
 from plain_skfem import TwoBlocks, exact_pressure
 from plain_skfem import solve as plain
+from planned_cases import draw_cases
 from scipy import sparse
 from scipy.sparse.linalg import splu
 from subjects import load_property, load_subject, plane_names
@@ -25,7 +26,7 @@ from contactverif.mechanics.bulk import assemble_stiffness, condense, forget_con
 from contactverif.mechanics.scene import forget_bodies
 from contactverif.plugins.registry import property_ids
 from contactverif.problems.uniform_stress import stress_error
-from contactverif.sampling.draw import Sampling, draw_cases
+from contactverif.sampling.draw import Sampling
 from contactverif_reports.html.report_page import report_page
 from contactverif_reports.netcdf.read import read_run
 from contactverif_reports.netcdf.write import write

@@ -3,12 +3,13 @@
 import numpy as np
 import pytest
 from plain_engine import Plain
+from planned_cases import draw_cases
 
 from contactverif import Property, Verdict, judge_case
 from contactverif.contract.property import Quantity
 from contactverif.contract.subject import EngineSubject
 from contactverif.plugins.registry import load_properties, property_ids
-from contactverif.sampling.draw import Sampling, draw_cases
+from contactverif.sampling.draw import Sampling
 from contactverif_properties.patch_bent import count_bare
 from contactverif_properties.patch_solved import REPORTED_FORCES, REPORTED_PRESSURES
 

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from planned_cases import draw_cases
 
 from contactverif import Body, Property, Scene, Verdict, judge_case
 from contactverif.contract.engine import EngineAnswer, EngineTraits, SceneArrays
@@ -16,7 +17,7 @@ from contactverif.isolation.remote import engine_program, load_remote_engine
 from contactverif.mechanics import changed_scenes
 from contactverif.plugins.registry import load_properties
 from contactverif.problems.space_problems import SHELLS
-from contactverif.sampling.draw import Sampling, draw_cases
+from contactverif.sampling.draw import Sampling
 from contactverif_engines import faces
 from contactverif_engines.calculix import CalculiX, make_layer, write_deck
 from contactverif_engines.control import Control

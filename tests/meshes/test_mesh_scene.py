@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from curved_bodies import write_curved_bodies
 from hypothesis.strategies import SearchStrategy
+from planned_cases import draw_cases
 from subjects import load_subject
 
 from contactverif import Case, End, Interface, MisuseError, Scene, Verdict, load_properties, read_scene, solve
@@ -15,7 +16,6 @@ from contactverif.contract.interface import ways_to_master
 from contactverif.contract.result import NOT_HERE
 from contactverif.meshes.mesh_scene import describe_bodies, parse_material, parse_support
 from contactverif.run.run import run
-from contactverif.sampling.draw import draw_cases
 from contactverif.strategies import general_cases, smooth_cases
 
 PUNCH = Path(__file__).parents[1] / "data" / "punch.msh"

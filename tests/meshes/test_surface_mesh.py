@@ -7,6 +7,7 @@ from typing import Any
 import meshlane
 import numpy as np
 import pytest
+from planned_cases import draw_cases
 from subjects import load_property, load_subject
 
 from contactverif import Interface, MisuseError
@@ -14,7 +15,6 @@ from contactverif.contract.interface import turns_of
 from contactverif.meshes.mesh_file import read_interface
 from contactverif.meshes.mesh_scene import read_scene
 from contactverif.run.run import run
-from contactverif.sampling.draw import draw_cases
 from contactverif.strategies.given_interface import close_surfaces, node_directions
 from contactverif.strategies.surfaces import smooth_surface_cases, surface_cases
 

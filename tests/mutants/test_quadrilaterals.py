@@ -6,13 +6,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from planned_cases import draw_cases
 from readable_cells import centre_points
 from subjects import load_subject
 from zoo.faces import STS, by_rule, changes_points
 
 from contactverif import Case, Property, Subject, Verdict, load_properties
 from contactverif.run.judge import judge_case
-from contactverif.sampling.draw import draw_cases
 from contactverif.strategies.surfaces import flat_surface_cases, surface_cases
 from contactverif_properties import exact_forces
 from contactverif_properties.patch_flat import patch_flat_transmission

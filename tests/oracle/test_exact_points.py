@@ -6,6 +6,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 from exact_projection import project_point
+from planned_cases import draw_cases
 
 from contactverif.contract.interface import Interface, Surface
 from contactverif.oracle.exact_points import (
@@ -22,7 +23,6 @@ from contactverif.oracle.exact_points import (
     slave_normal_view,
 )
 from contactverif.oracle.nearest import nearest_segments
-from contactverif.sampling.draw import draw_cases
 from contactverif.strategies import general_cases
 
 U = 2.0**-53

@@ -6,6 +6,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from planned_cases import draw_cases
 
 from contactverif import Interface
 from contactverif.oracle.flat_answers import (
@@ -15,7 +16,6 @@ from contactverif.oracle.flat_answers import (
     uniform_surface_weights,
     uniform_surface_weights_exact,
 )
-from contactverif.sampling.draw import draw_cases
 from contactverif.strategies.surfaces import flat_surface_cases
 
 SQUARE = [[0.0, 0], [1, 0], [1, 1], [0, 1]]

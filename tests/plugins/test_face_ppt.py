@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from planned_cases import draw_cases
 
 from contactverif import Case, Interface, load_formulation, named_case
 from contactverif.contract.arrays import UNIT_ROUNDOFF
-from contactverif.sampling.draw import draw_cases
 from contactverif.strategies.surfaces import (
     flat_surface_cases,
     sliding_surface_cases,

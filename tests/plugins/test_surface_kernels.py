@@ -4,13 +4,13 @@ from functools import cache
 
 import numpy as np
 import pytest
+from planned_cases import draw_cases
 from readable_cells import readable_vts_cell
 
 from contactverif import Case, Interface, Pairing, named_case
 from contactverif.contract.arrays import UNIT_ROUNDOFF
 from contactverif.oracle.exact_points import Lattice, covered_shares
 from contactverif.problems.flat_states import SpaceMotion
-from contactverif.sampling.draw import draw_cases
 from contactverif.strategies.surfaces import flat_surface_cases, smooth_surface_cases, surface_cases
 from contactverif_surfaces import vts_cell_3d
 

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
+from planned_cases import draw_cases
 
 from contactverif import Interface
 from contactverif.contract.arrays import FloatArray, IntArray
-from contactverif.sampling.draw import draw_cases
 from contactverif.strategies.surfaces import flat_surface_cases, surface_cases, translated_surface_cases
 from contactverif_surfaces.cell_points import FacePairs, SlaveView
 from contactverif_surfaces.face_search import (

@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from planned_cases import draw_cases
 
 import contactverif_surfaces
 from contactverif import Case, Interface, Pairing, Subject, named_case
 from contactverif.contract.arrays import UNIT_ROUNDOFF, FloatArray
 from contactverif.oracle.flat_answers import uniform_surface_weights
-from contactverif.sampling.draw import draw_cases
 from contactverif.strategies.surfaces import flat_surface_cases, smooth_surface_cases
 from contactverif_surfaces.cell_points import GAUSS, evaluate_shapes
 

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from planned_cases import draw_cases
 from subjects import judge_as, load_property, load_subject, with_promises
 from textbook_cells import ClippedCells, WeightedGaps
 from zoo.at_points import SlaveNormalAtGaussPoints
@@ -13,7 +14,6 @@ from zoo.at_points import SlaveNormalAtGaussPoints
 import contactverif_surfaces
 from contactverif import Case, Promises, Subject, Traits, Verdict, named_case
 from contactverif.contract.arrays import FloatArray
-from contactverif.sampling.draw import draw_cases
 from contactverif.strategies.surfaces import sliding_surface_cases
 from contactverif.strategies.translations import _opens_at_once, sliding_cases
 from contactverif_properties.balance import N_STEPS, continuity, find_jumps

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from planned_cases import draw_cases
 from subjects import judge_as, load_property
 from zoo.at_points import LogBarrier
 from zoo.barriers import Bounded, BoundedWork, HalfAtVertices, InsidesAlone, SlaveAlone
@@ -17,7 +18,6 @@ from contactverif.plugins.registry import property_ids
 from contactverif.problems.open_states import LARGEST, LEAST, fit_to_traits, least_distance
 from contactverif.run.judge import FirstCall, call_first
 from contactverif.run.run import run
-from contactverif.sampling.draw import draw_cases
 from contactverif.strategies import flat_cases, smooth_cases
 from contactverif.strategies.closings import closing_cases
 from contactverif.strategies.general import closed_cases

@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from planned_cases import draw_cases
 from subjects import load_property, load_subject, measure_case, reporting
 from zoo.at_points import PointsFirst, TurnedFrame
 
 import contactverif_mortar
 from contactverif import Case, ContactPoints, Interface, Outcome, Subject, Surface, Verdict, judge_case
 from contactverif.problems.flat_states import flat_face_state, grid
-from contactverif.sampling.draw import draw_cases
 
 IDS = ("projection.segment", "projection.place", "projection.activity", "projection.area", "projection.forces")
 

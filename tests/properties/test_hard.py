@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from exact_projection import project_point
 from hard_strangers import PointSprings, Softened
+from planned_cases import draw_cases
 from subjects import load_property, load_subject, with_promises
 
 from contactverif import Body, Measurement, Outcome, Property, Subject, Verdict, judge_case, load_properties
@@ -30,7 +31,6 @@ from contactverif.problems.flat_states import (
     touching_states,
 )
 from contactverif.problems.hard_corner_states import concave_corner_states, convex_kink_states
-from contactverif.sampling.draw import draw_cases
 from contactverif_nts import nts, vts_me, vts_ppt_balanced
 from contactverif_properties.applicability import knows_total
 from contactverif_properties.hard import covered_share

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from handmade import Handmade, Springs, case, over_a_node, subject
+from planned_cases import draw_cases
 from subjects import judge_as, load_property, load_subject, with_promises
 from textbook_springs import CentredSprings
 from zoo.at_points import NearbyOnly, TurnedFrame
@@ -14,7 +15,6 @@ from zoo.at_points import NearbyOnly, TurnedFrame
 import contactverif_nts
 from contactverif import Abilities, Case, Interface, Promises, Rules, Subject, Surface, Traits, Verdict, judge_case
 from contactverif.run.run import run
-from contactverif.sampling.draw import draw_cases
 from contactverif_properties.balance import RADII, symmetric
 from contactverif_properties.invariants import (
     BEHIND,

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from handmade import plain
+from planned_cases import draw_cases
 from subjects import Changed, judge_as, load_subject, with_verbs
 
 import contactverif_nts
@@ -18,7 +19,6 @@ from contactverif.mechanics.scene import scene_of
 from contactverif.mechanics.system import System
 from contactverif.problems.catalogue import load_scene_case
 from contactverif.run.run import run
-from contactverif.sampling.draw import draw_cases
 from contactverif.strategies.solids import solid_cases
 from contactverif_properties.newton_method import (
     DISTANCES,

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from hard_strangers import PointSprings, Softened
+from planned_cases import draw_cases
 from subjects import Changed, judge_as, load_property, load_subject, reporting, with_promises, with_verbs
 from textbook_cells import ClippedCells
 from zoo.at_points import PointsFirst, TurnedFrame
@@ -20,7 +21,6 @@ from contactverif.contract.traits import parse_forces
 from contactverif.problems.catalogue import load_scene_case
 from contactverif.problems.named_states import FLAT_NAMES, named_case
 from contactverif.run.run import run
-from contactverif.sampling.draw import draw_cases
 from contactverif_nts.point_contact import FORCE_TABLES
 from contactverif_properties.exact_forces import (
     directions,

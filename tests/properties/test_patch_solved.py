@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from planned_cases import draw_cases
 from subjects import judge_as, load_subject, reporting, with_verbs
 
 import contactverif_mortar
@@ -17,7 +18,6 @@ from contactverif.problems.catalogue import BLOCKS, load_scene_case, make_scene
 from contactverif.problems.flat_states import overhangs
 from contactverif.problems.uniform_stress import stress_error
 from contactverif.run.run import run
-from contactverif.sampling.draw import draw_cases
 from contactverif.strategies.solids import VARIANTS as NAMES_OF_VARIANTS
 from contactverif.strategies.solids import dead_zone_cases, variant_cases
 from contactverif_properties.exact_forces import consistent_forces, gap_error

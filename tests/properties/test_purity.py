@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from handles import Handled
 from handmade import Handmade, case, over_a_node, subject
+from planned_cases import draw_cases
 from subjects import judge_as, load_subject
 
 import contactverif_mortar
@@ -24,7 +25,7 @@ from contactverif import (
     load_scene,
 )
 from contactverif.run.run import run
-from contactverif.sampling.draw import Sampling, draw_cases
+from contactverif.sampling.draw import Sampling
 from contactverif_properties.purity import (
     BATCHED,
     IN_ONE_CALL,

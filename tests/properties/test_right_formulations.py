@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from gauss_springs import RIGHT, GaussSprings
 from hard_strangers import PointSprings, Softened, simpson, trapezoid
+from planned_cases import draw_cases
 from subjects import judge_as, load_property, load_subject, with_promises
 from textbook_cells import ClippedCells, WeightedGaps
 from textbook_springs import CentredSprings, NodalMultipliers, QuadraticSprings
@@ -16,7 +17,6 @@ from zoo.right import STRANGERS
 
 from contactverif import Case, Interface, Promises, Property, Rules, Subject, Traits, Verdict, judge_case
 from contactverif.plugins.registry import property_ids
-from contactverif.sampling.draw import draw_cases
 
 NORMAL, SINGLE, NODAL, PUBLISHED = (f"patch.flat.{name}" for name in ("normal", "single", "nodal", "published"))
 ALL = 10**6  # More cases than a list has.

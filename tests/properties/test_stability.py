@@ -12,6 +12,7 @@ import pytest
 from expected_verdicts import FAILS
 from fresh_process import PYTHON
 from gauss_springs import RIGHT, WRONG, by_differences, by_points_first, springs_of
+from planned_cases import draw_cases
 from subjects import ResidualAlone, alone, judge_as, load_property, load_subject, measure_case, with_verbs
 from textbook_cells import WeightedGaps
 
@@ -44,7 +45,6 @@ from contactverif.problems.refined_blocks import (
 from contactverif.problems.space_scenes import stability_space_scenes
 from contactverif.problems.stability_states import SWEEPS, stability_scenes, stability_states
 from contactverif.run.run import run
-from contactverif.sampling.draw import draw_cases
 from contactverif.strategies.translations import KINDS
 from contactverif_properties.exact_forces import forces_of_penetration, node_gaps
 from contactverif_properties.roundoff import CONDITION, ERROR, FORCE_ERROR

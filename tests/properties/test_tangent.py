@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from gauss_springs import RIGHT, springs_of
 from handmade import Handmade, OneForce, Plain, case, over_a_node, plain, subject
+from planned_cases import draw_cases
 from subjects import judge_as, load_subject
 
 from contactverif import Case, Interface, Promises, Subject, Traits, Verdict, judge_case
@@ -17,7 +18,6 @@ from contactverif.contract.counterexample import counterexamples
 from contactverif.contract.property import judge
 from contactverif.problems.long_states import long_states
 from contactverif.run.run import run
-from contactverif.sampling.draw import draw_cases
 from contactverif.strategies import smooth_cases
 from contactverif.testing.checks import explain
 from contactverif_properties.states import freeze_state, random_directions

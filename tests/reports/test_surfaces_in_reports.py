@@ -8,6 +8,7 @@ import meshlane
 import numpy as np
 import pytest
 import xarray as xr
+from planned_cases import draw_cases
 from subjects import load_property, load_subject, same_case
 
 from contactverif import Case, Interface, Run, judge_case, named_case
@@ -17,7 +18,6 @@ from contactverif.contract.result import NodalForces
 from contactverif.problems.space_scenes import vanishing_space_scenes
 from contactverif.run.judge import forces_to_draw
 from contactverif.run.run import run
-from contactverif.sampling.draw import draw_cases
 from contactverif.strategies.surfaces import flat_surface_cases
 from contactverif.studies.solved_scenes import solve_scene
 from contactverif_reports.exchange.run_document import document_of

@@ -248,9 +248,9 @@ def test_cases_depend_on_no_loaded_module_and_nothing_is_written(tmp_path: Path)
         "import sys\n"
         "if sys.argv[1] == 'with': import of_a_user\n"
         "from hypothesis import strategies as st\n"
-        "from contactverif.sampling.draw import draw_cases\n"
+        "from contactverif.sampling.draw import draw_block\n"
         "strategy = st.lists(st.one_of(st.integers(1000, 8000), st.floats(0, 1)), max_size=9)\n"
-        "print(draw_cases(strategy, seed='1', examples=200).cases)\n"
+        "print(draw_block(strategy, seed='1', examples=200, number=0).cases)\n"
     )
 
     def output(argument: str, hash_seed: str) -> str:

@@ -10,13 +10,14 @@ from typing import Any
 
 import pytest
 from hypothesis import strategies as st
+from planned_cases import draw_cases
 from subjects import same_case
 
 from contactverif import Case, Interface, Measurement, Property, Quantity, Subject, Traits, Verdict, load_properties
 from contactverif.contract.case import random_source
 from contactverif.run.rows import WHOLE
 from contactverif.run.run import run
-from contactverif.sampling.draw import BLOCK, draw_block, draw_case, draw_cases, shrink, strategy_name
+from contactverif.sampling.draw import BLOCK, draw_block, draw_case, shrink, strategy_name
 from contactverif.sampling.hypothesis_draws import draw_different, find_difference, shrink_case
 
 INTERFACE = Interface.from_chains([[0.0, 0.0], [1.0, 0.0]], [[1.0, 0.0], [0.0, 0.0]])

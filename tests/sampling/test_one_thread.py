@@ -5,11 +5,12 @@ from dataclasses import replace
 
 from fresh_process import PYTHON
 from hypothesis import strategies as st
+from planned_cases import draw_cases
 from subjects import load_property
 from threadpoolctl import threadpool_info, threadpool_limits
 
 from contactverif import Case, named_case
-from contactverif.sampling.draw import Sampling, draw_cases, shrink
+from contactverif.sampling.draw import Sampling, shrink
 
 # A run that judged something before scipy's own BLAS was there.
 LATE = """

@@ -7,11 +7,11 @@ import pytest
 from exact_projection import project_point
 from hypothesis import Phase, find, settings
 from hypothesis.strategies import SearchStrategy
+from planned_cases import draw_cases
 
 from contactverif import Case, Interface, load_formulation, named_case
 from contactverif.oracle.projection_kinds import KIND_TESTS, is_of_kind, kind_of
 from contactverif.problems.catalogue import load_scene_case
-from contactverif.sampling.draw import draw_cases
 from contactverif.strategies.projection_situations import KINDS, projection_states, projections_by_kind
 from contactverif_properties.contact_points import projected_cases
 

@@ -12,6 +12,7 @@ import pytest
 from exact_projection import projection_cases
 from hypothesis import find, settings
 from hypothesis.strategies import SearchStrategy
+from planned_cases import draw_cases
 
 from contactverif import Case, Interface, MisuseError
 from contactverif.contract.arrays import UNIT_ROUNDOFF
@@ -23,7 +24,6 @@ from contactverif.problems.blocks import is_uniform
 from contactverif.problems.catalogue import load_scene_case
 from contactverif.problems.flat_states import overhangs
 from contactverif.problems.named_states import FLAT_NAMES, NAMED, named_case
-from contactverif.sampling.draw import draw_cases
 from contactverif.strategies import (
     flat_cases,
     general_cases,

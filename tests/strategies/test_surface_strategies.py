@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 import pytest
 from hypothesis import Phase, find, settings
+from planned_cases import draw_cases
 
 from contactverif import Case
 from contactverif.contract.interface import turns_of
 from contactverif.oracle.flat_answers import nodal_surface_weights, uniform_surface_weights_exact
-from contactverif.sampling.draw import draw_cases
 from contactverif.strategies.straight import steep_plane_cases, tilted_plane_cases
 from contactverif.strategies.surfaces import (
     flat_surface_cases,

@@ -5,12 +5,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from planned_cases import draw_cases
 from subjects import load_subject
 
 from contactverif import Case, MisuseError, Rectangle, Scene, Subject, load_scene, named_case, solve, two_blocks
 from contactverif.contract.result import NotLoaded
 from contactverif.run.judge import forces_on
-from contactverif.sampling.draw import draw_cases
 from contactverif.strategies.solids import block_cases
 from contactverif.studies.solved_scenes import solve_scene
 

@@ -2,6 +2,7 @@
 
 import pytest
 from page import PAGE, campaign_counts, catchers, caught_alone, kill_rows, page, size_of
+from planned_cases import draw_cases
 from right import SEEDS, all_variants
 from subjects import load_property, load_subject
 from tables import FOLDER, read
@@ -10,7 +11,6 @@ from zoo.right import STRANGERS
 from contactverif import Verdict, judge_case
 from contactverif.contract.property import NONE_UNDECIDED
 from contactverif.plugins.registry import property_ids
-from contactverif.sampling.draw import draw_cases
 
 # Reasons why a property has no wrong formulation that it alone catches: {the properties: the reason}.
 _SHARED = {

@@ -8,10 +8,11 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from planned_cases import draw_cases
 from subjects import Changed, load_property
 
 from contactverif import Case, Property, Subject, Verdict, judge_case, load_properties
-from contactverif.sampling.draw import Sampling, draw_cases
+from contactverif.sampling.draw import Sampling
 from zoo.making import PLANE, SPACE, SURVIVORS, Make, Mutant
 from zoo.mutants import faces
 
