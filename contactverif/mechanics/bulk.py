@@ -245,8 +245,7 @@ def _last_block(whole: Any, first: IntArray, last: IntArray) -> FloatArray | Non
     end = np.arange(len(first), len(places))
     if not ((factors.perm_c[end] == end).all() and (factors.perm_r[end] == end).all()):
         return None
-    block: FloatArray = (factors.L[end][:, end] @ factors.U[end][:, end]).toarray() - np.diag(shift[end])
-    return block
+    return np.asarray((factors.L[end][:, end] @ factors.U[end][:, end]).toarray() - np.diag(shift[end]))
 
 
 def forget_condensed() -> None:

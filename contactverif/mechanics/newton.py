@@ -149,8 +149,7 @@ class Trace:
     @property
     def solution(self) -> FloatArray:
         """The unknowns of the scene at the last iterate (n_free,)."""
-        last: FloatArray = self.q[-1]
-        return last
+        return np.asarray(self.q[-1])
 
     @property
     def multipliers(self) -> FloatArray:

@@ -438,8 +438,7 @@ def _move_freely(body: bulk.CondensedBody, factor: float) -> FloatArray | None:
     stiffnesses, modes = linalg.eigh(body.stiffness)
     if stiffnesses[0] <= len(modes) * UNIT_ROUNDOFF * stiffnesses[-1]:
         return None
-    unknowns: FloatArray = modes @ (modes.T @ (factor * body.load) / stiffnesses)
-    return unknowns
+    return np.asarray(modes @ (modes.T @ (factor * body.load) / stiffnesses))
 
 
 def has_bodies(case: Case) -> bool:

@@ -66,8 +66,7 @@ class Differences:
 
     def by_unknown(self) -> FloatArray:
         """Return the derivative (n, n), by a difference for each unknown."""
-        derivative: FloatArray = (self._along(np.diag(self.steps)) / self.steps[:, None]).T
-        return derivative
+        return np.asarray((self._along(np.diag(self.steps)) / self.steps[:, None]).T)
 
     def by_groups(self, reach: float) -> FloatArray | None:
         """Return the derivative (n, n) of a state without multipliers, if forces reach no farther than a length.
@@ -247,8 +246,7 @@ class System:
         # iteration, and so do its forces: counted over those displacements alone, they would never be small.
         displacements = np.maximum(np.abs(u[:n_free]), UNIT_ROUNDOFF * largest)
         terms[:n_free] += stiffness @ displacements + self.factor * np.abs(scene.load)
-        floor: FloatArray = ROUNDOFF_FACTOR * UNIT_ROUNDOFF * terms
-        return floor
+        return np.asarray(ROUNDOFF_FACTOR * UNIT_ROUNDOFF * terms)
 
     def step(self, matrix: Any, right: FloatArray, floor: FloatArray | None = None) -> Step:
         """Solve matrix · step = right; roundoff alone may cause `floor` (n,) of the right-hand side."""

@@ -172,8 +172,7 @@ def dot(a: Integers, b: Integers) -> Integers:
 
 
 def _cross(a: Integers, b: Integers) -> Integers:
-    product: Integers = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
-    return product
+    return np.asarray(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
 
 
 def roots(squares: Integers) -> Integers:
@@ -257,8 +256,7 @@ def _farther_than_nearest(lattice: Lattice, points: ExactPoints, choice: IntArra
     near = gap <= DEEP * (other.slave_length + other.master_length)
     rival = (other.cosine > 0) & (xi > 0) & (xi < 1) & near
     gaps = np.where(rival, gap, np.inf).reshape(len(choice), n_master).min(axis=1, initial=np.inf)
-    farther: FloatArray = np.maximum(np.abs(view.gap.floats()) - gaps, 0.0)
-    return farther
+    return np.asarray(np.maximum(np.abs(view.gap.floats()) - gaps, 0.0))
 
 
 def overlaps(lattice: Lattice, slave_segment: IntArray, segments: IntArray) -> tuple[Integers, Integers, Integers]:

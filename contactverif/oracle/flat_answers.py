@@ -221,13 +221,11 @@ def _integrate_part(corners: FloatArray, part: FloatArray) -> FloatArray:
     edge = first + t[..., None] * twist
     s = ((r - t[..., None] * last) * edge).sum(axis=-1) / (edge**2).sum(axis=-1)
     shapes = np.stack([(1 - s) * (1 - t), s * (1 - t), s * t, (1 - s) * t])
-    total: FloatArray = (shapes * weights).sum(axis=(1, 2, 3))
-    return total
+    return np.asarray((shapes * weights).sum(axis=(1, 2, 3)))
 
 
 def _cross(a: FloatArray, b: FloatArray) -> FloatArray:
-    product: FloatArray = a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
-    return product
+    return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])
 
 
 def _mean(points: Sequence[Point]) -> Point:

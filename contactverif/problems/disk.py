@@ -200,8 +200,7 @@ def grade(length: float, first: float, parts: int, steps: int) -> FloatArray:
 
     # The parts grow by e^growth from first to last. expm1 overflows beyond 709.
     growth = brentq(lambda growth: length * expm1(growth / parts) / expm1(growth) - first, 1e-9, 700.0)
-    coordinates: FloatArray = length * np.expm1(growth * (np.arange(steps + 1) / steps)) / expm1(growth)
-    return coordinates
+    return np.asarray(length * np.expm1(growth * (np.arange(steps + 1) / steps)) / expm1(growth))
 
 
 def _mirror(half: FloatArray) -> FloatArray:

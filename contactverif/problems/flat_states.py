@@ -437,8 +437,7 @@ class SpaceMotion:
     def axes(self) -> FloatArray:
         """The unit vectors (3, 3) that the axes become, as rows."""
         rows, size = rotation(self.quaternion)
-        axes: FloatArray = np.array(rows).T / size
-        return axes
+        return np.asarray(np.array(rows).T / size)
 
     @property
     def normal(self) -> FloatArray:

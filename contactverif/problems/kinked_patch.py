@@ -44,8 +44,7 @@ class KinkedPatch:
     def normals(self) -> FloatArray:
         """The unit normals (n_facets, 2) of the facets, upwards."""
         along = np.diff(np.array(self.line), axis=0)
-        normals: FloatArray = np.column_stack([-along[:, 1], along[:, 0]]) / np.linalg.norm(along, axis=1)[:, None]
-        return normals
+        return np.asarray(np.column_stack([-along[:, 1], along[:, 0]]) / np.linalg.norm(along, axis=1)[:, None])
 
     @property
     def sharpest(self) -> float:
@@ -63,8 +62,7 @@ class KinkedPatch:
 
         With three or more normals it is the nearest by least squares.
         """
-        answer: FloatArray = np.linalg.lstsq(self.normals, np.full(len(self.normals), -penetration))[0]
-        return answer
+        return np.asarray(np.linalg.lstsq(self.normals, np.full(len(self.normals), -penetration))[0])
 
     def displacement(self, places: FloatArray, penetration: float, *, upper: bool) -> FloatArray:
         """Return the displacement (n, 2) of one block at places (n, 2): both contract, and the upper one moves down."""

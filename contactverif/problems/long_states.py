@@ -102,8 +102,7 @@ def _places(seed: int, count: int, *, graded: bool = False) -> FloatArray:
         steps = np.concatenate([half, half[::-1]]) * random.uniform(0.9, 1.1, count)
     else:
         steps = random.uniform(0.7, 1.4, count)
-    places: FloatArray = np.concatenate([[0.0], np.cumsum(steps)]) / steps.sum()
-    return places
+    return np.asarray(np.concatenate([[0.0], np.cumsum(steps)]) / steps.sum())
 
 
 def _open(slave: FloatArray, master: FloatArray, *, along: float = 0.0, wavy: bool = False) -> _Part:

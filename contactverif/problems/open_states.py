@@ -161,8 +161,7 @@ def _node_normals(surface: Surface, positions: FloatArray) -> FloatArray:
     for end in (0, 1):
         np.add.at(normals, surface.segments[:, end], np.column_stack([run[:, 1], -run[:, 0]]))
     size = np.linalg.norm(normals, axis=1)[:, None]
-    units: FloatArray = np.divide(normals, size, out=np.zeros_like(normals), where=size > 0)
-    return units
+    return np.asarray(np.divide(normals, size, out=np.zeros_like(normals), where=size > 0))
 
 
 def _is_closed(surface: Surface) -> bool:

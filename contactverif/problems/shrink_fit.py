@@ -295,14 +295,12 @@ class RingStudy:
         outwards = (1 if ring else -1) * self.problem._flexibilities[ring] * fit.force
 
         def motion(places: FloatArray) -> FloatArray:
-            moves: FloatArray = outwards * places / np.linalg.norm(places, axis=1)[:, None]
-            return moves
+            return np.asarray(outwards * places / np.linalg.norm(places, axis=1)[:, None])
 
         def traction(of_master: bool, places: FloatArray) -> FloatArray:
             radii = np.linalg.norm(places, axis=1)[:, None]
             towards = -1.0 if (self.slave == "inner") is not of_master else 1.0
-            pressures: FloatArray = towards * (fit.master_force / radii if of_master else fit.pressure) * places / radii
-            return pressures
+            return np.asarray(towards * (fit.master_force / radii if of_master else fit.pressure) * places / radii)
 
         def forces(positions: FloatArray) -> FloatArray:
             sides = ((scene.interface.slave, False), (scene.interface.master, True))

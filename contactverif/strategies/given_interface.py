@@ -205,8 +205,7 @@ def node_directions(surface: Surface, nodes: FloatArray) -> FloatArray:
     normals = np.zeros_like(nodes)
     np.add.at(normals, surface.faces, turns[:, None])
     sizes = np.linalg.norm(normals, axis=1, keepdims=True)
-    units: FloatArray = np.divide(normals, sizes, out=np.zeros_like(normals), where=sizes > 0)
-    return units
+    return np.asarray(np.divide(normals, sizes, out=np.zeros_like(normals), where=sizes > 0))
 
 
 def close_surfaces(interface: Interface, directions: FloatArray) -> FloatArray:

@@ -281,8 +281,7 @@ def continuity(case: Case, subject: Subject) -> Measurement:
             ("residual", interface, pairing, pair) for pairing, pair in zip(pairings, around, strict=True)
         ]
         both = np.array(formulation.answers(calls))  # (k, 2, n_unknowns)
-        slope: FloatArray = (both[:, 1] - both[:, 0]) / (2 * DIFFERENCE)
-        return slope
+        return np.asarray((both[:, 1] - both[:, 0]) / (2 * DIFFERENCE))
 
     samples = forces(PLACES)
     size = max(sum_larger_forces(case, sample) for sample in samples)

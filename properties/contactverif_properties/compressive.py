@@ -64,8 +64,7 @@ class _Constraints:
         # The area of an inactive constraint may be unknown: a second pass may be covered in part.
         known = active | (self.rules.penalty == "nodal") | (self.rules.area is not None) & (self.areas > 0)
         signs = np.where(rows * multipliers > 0, 0.0, np.inf)  # The area of an inactive constraint is positive.
-        errors: FloatArray = np.where(known, np.abs(rows - self.right(multipliers, gap)) / sizes, signs)
-        return errors
+        return np.asarray(np.where(known, np.abs(rows - self.right(multipliers, gap)) / sizes, signs))
 
 
 def check_constraint_rows(
@@ -216,8 +215,7 @@ def _open_all_but_one_end(case: Case, closed: float = CLOSED) -> Case:
 def _slave_places(case: Case) -> FloatArray:
     """Return where the slave's nodes lie along a flat interface (n_slave_nodes,), from 0 to 1; in space along x."""
     slave = _places_along(case)[: case.interface.n_slave_nodes]
-    places: FloatArray = (slave - slave.min()) / np.ptp(slave)
-    return places
+    return np.asarray((slave - slave.min()) / np.ptp(slave))
 
 
 def _places_along(case: Case) -> FloatArray:

@@ -199,8 +199,7 @@ class _FacePlaces:
     @property
     def depth_inside(self) -> FloatArray:
         """The depth of each foot (n_points,) inside its face, a length; negative outside."""
-        depth: FloatArray = self.view.shape.floats().min(axis=1, initial=np.inf) * self.view.heights
-        return depth
+        return np.asarray(self.view.shape.floats().min(axis=1, initial=np.inf) * self.view.heights)
 
     @property
     def beside_border(self) -> BoolArray:
@@ -241,8 +240,7 @@ class _FacePlaces:
 
 
 def _longest_edges(corners: FloatArray) -> FloatArray:
-    longest: FloatArray = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1, initial=0.0)
-    return longest
+    return np.asarray(np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1, initial=0.0))
 
 
 def _refuse_without_rule(traits: Traits) -> str:

@@ -235,8 +235,7 @@ def unit_forces(state: FrozenState) -> FloatArray:
     multipliers = np.vstack([size * np.eye(count), np.zeros(count)])
     states = np.hstack([np.broadcast_to(case.z[:n], (count + 1, n)), multipliers])
     forces = state.residual_at(states)[:, :n]
-    columns: FloatArray = (forces[:-1] - forces[-1]).T / size
-    return columns
+    return np.asarray((forces[:-1] - forces[-1]).T / size)
 
 
 def exact_multipliers(case: Case, subject: Subject, formulation: CheckedFormulation, pressure: float) -> FloatArray:
@@ -413,5 +412,4 @@ def _faces(place: FloatArray, surface: Surface, along: FloatArray, rounding: flo
     inwards = np.sign(ends[:, ::-1] - ends)
     ends = ends + np.where(surface.neighbours < 0, rounding, -rounding) * inwards
     low, high = ends.min(axis=1), ends.max(axis=1)
-    covered: BoolArray = ((place[:, None] >= low) & (place[:, None] <= high)).any(axis=1)
-    return covered
+    return np.asarray(((place[:, None] >= low) & (place[:, None] <= high)).any(axis=1))

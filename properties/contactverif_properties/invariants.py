@@ -90,8 +90,7 @@ class _Change(NamedTuple):
         node, axes = int(np.abs(self.change).argmax()) % n_columns // self.dim, np.arange(self.dim)
         if self.nodes is not None and number > 0:
             return self.dim * int(self.nodes[node]) + axes
-        columns: IntArray = np.minimum(self.dim * node + axes, n_columns - 1)
-        return columns
+        return np.asarray(np.minimum(self.dim * node + axes, n_columns - 1))
 
 
 def _judge_changes(
@@ -435,8 +434,7 @@ def _add_parts(case: Case, slave: _Part, master: _Part, *, first: bool = False) 
     number = np.argsort(order)  # The new number of each node: of the old ones, then of the new parts.
 
     def join(nodes: FloatArray) -> FloatArray:
-        joined: FloatArray = np.vstack([nodes, slave[0], master[0]])[order]
-        return joined
+        return np.asarray(np.vstack([nodes, slave[0], master[0]])[order])
 
     def surface(old: Surface, part: _Part, at: int) -> Surface:
         faces = [number[old.faces], number[part[1] + at]]

@@ -133,8 +133,7 @@ def _differentiate(state: FrozenState, z: FloatArray, columns: IntArray | None =
     moves = step * np.eye(z.size)
     moves = moves if columns is None else moves[columns]
     forces = state.residual_at(np.concatenate([z + moves, z - moves]))
-    slope: FloatArray = (forces[: len(moves)] - forces[len(moves) :]).T / (2 * step)
-    return slope
+    return np.asarray((forces[: len(moves)] - forces[len(moves) :]).T / (2 * step))
 
 
 def _rounding_share(case: Case) -> float:

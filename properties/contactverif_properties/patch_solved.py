@@ -323,8 +323,7 @@ def is_solved(trace: Trace, exact: FloatArray, penetration: float) -> bool:
 def nearest_to_balance(trace: Trace) -> FloatArray:
     """Return the start (n_free + n_multipliers,) if it is nearly in balance, else the later iterate nearest to it."""
     balanced = trace.roundings[0] <= NEAR_CONVERGENCE or len(trace.u) == 1
-    iterate: FloatArray = trace.u[0 if balanced else 1 + np.argmin(trace.roundings[1:])]
-    return iterate
+    return np.asarray(trace.u[0 if balanced else 1 + np.argmin(trace.roundings[1:])])
 
 
 def forces_to_draw(case: Case) -> FloatArray:

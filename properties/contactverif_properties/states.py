@@ -176,5 +176,4 @@ def random_moves(seed: int, count: int, size: int) -> FloatArray:
 def random_directions(seed: int, count: int, size: int) -> FloatArray:
     """Draw directions (count, size): random moves, each divided by its largest entry, which becomes ±1."""
     moves = random_moves(seed, count, size)
-    directions: FloatArray = moves / np.abs(moves).max(axis=1, keepdims=True)
-    return directions
+    return np.asarray(moves / np.abs(moves).max(axis=1, keepdims=True))

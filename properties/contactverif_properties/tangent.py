@@ -81,8 +81,7 @@ class Groups:
     def largest(self, matrix: FloatArray) -> FloatArray:
         """Return the largest absolute entry of each block (count, count) of a matrix (size, size)."""
         first = self.unknowns[:, 0]
-        largest: FloatArray = np.maximum.reduceat(np.maximum.reduceat(np.abs(matrix), first), first, axis=1)
-        return largest
+        return np.asarray(np.maximum.reduceat(np.maximum.reduceat(np.abs(matrix), first), first, axis=1))
 
     def surroundings(self, blocks: FloatArray) -> FloatArray:
         """Return for each block the largest block of its row or its column, all (count, count).
@@ -527,8 +526,7 @@ class _Sides:
 def _extrapolate(differences: FloatArray) -> FloatArray:
     """Return one-sided differences (n_steps, …) at a step of zero, from the two shorter steps."""
     ratio = STEPS[1] / STEPS[2]
-    limit: FloatArray = (ratio * differences[2] - differences[1]) / (ratio - 1)
-    return limit
+    return np.asarray((ratio * differences[2] - differences[1]) / (ratio - 1))
 
 
 # Combinations of directions that are shorter than this share s of the longest are left out. A central difference is
@@ -710,8 +708,7 @@ def _row_sizes(state: FrozenState, derivatives: FloatArray, turns: FloatArray) -
     around = np.where(blocks > 0, groups.surroundings(blocks), 0.0).max(axis=1)
     at_nodes = np.zeros(groups.count)
     np.maximum.at(at_nodes, groups.of_unknowns, np.maximum(derivatives, turns))
-    sizes: FloatArray = np.maximum(at_nodes, around)[groups.of_unknowns]
-    return sizes
+    return np.asarray(np.maximum(at_nodes, around)[groups.of_unknowns])
 
 
 def _worst_row(
@@ -752,8 +749,7 @@ def taylor_slope(remainders: FloatArray, steps: FloatArray, floors: FloatArray) 
 
 
 def _central_steps(case: Case, length: float) -> FloatArray:
-    steps: FloatArray = np.array(STEPS) * length * (UNIT_ROUNDOFF * case.largest_coordinate / length) ** (1 / 3)
-    return steps
+    return np.asarray(np.array(STEPS) * length * (UNIT_ROUNDOFF * case.largest_coordinate / length) ** (1 / 3))
 
 
 def _all_steps(case: Case, length: float) -> FloatArray:
@@ -833,8 +829,7 @@ def defect_directions(directions: FloatArray, defects: FloatArray) -> FloatArray
     on_basis = defects.T @ (weights[spanned].T / sizes[spanned])  # The map on the basis, (n, n_spanned).
     singular = basis[:, spanned] @ np.linalg.svd(on_basis, full_matrices=False)[2][0]
     both = np.array([worst, singular])
-    scaled: FloatArray = both / np.abs(both).max(axis=1, keepdims=True)
-    return scaled
+    return np.asarray(both / np.abs(both).max(axis=1, keepdims=True))
 
 
 def _chains(surface: Surface) -> list[IntArray]:
