@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from contactverif.contract.arrays import UNIT_ROUNDOFF, BoolArray, FloatArray, IntArray
 from contactverif.contract.interface import Interface, measure_heights
-from contactverif.oracle.flat_answers import cut_polygon, turn
+from contactverif.oracle.flat_answers import cross, cut_polygon, turn
 from contactverif.oracle.nearest import integers, nearest_of, reach
 
 Integers = NDArray[Any]  # An array of Python integers of any size.
@@ -131,7 +131,7 @@ def _view(lattice: Lattice, points: ExactPoints, segments: IntArray, *, closest:
     above = Ratios(advance, np.full(len(arm), lattice.scale**2, dtype=object)).floats()
     return View(
         xi=Ratios(-sign * dot(arm, carrier), points.weight * size),
-        gap=Ratios(sign * root * _cross(arm, along), points.weight * size * lattice.scale << ROOT_SHIFT),
+        gap=Ratios(sign * root * cross(arm, along), points.weight * size * lattice.scale << ROOT_SHIFT),
         normal=Ratios(np.stack([-carrier[:, 1], carrier[:, 0]], axis=1) << ROOT_SHIFT, root[:, None]),
         lengths=distance + master + slave,
         slave_length=slave,
@@ -149,8 +149,8 @@ def run_against(lattice: Lattice, points: ExactPoints, segments: IntArray) -> Bo
     return (dot(along, points.along) < 0).astype(np.bool_)
 
 
-def positions(lattice: Lattice, points: ExactPoints) -> Ratios:
-    """Return the positions (n_points, 2) of the points, lengths."""
+def positions(lattice: Lattice, points: "ExactPoints | ExactFacePoints") -> Ratios:
+    """Return the positions (n_points, dim) of the points, lengths."""
     return Ratios(points.place, (points.weight * lattice.scale)[:, None])
 
 
@@ -169,10 +169,6 @@ def dot(a: Integers, b: Integers) -> Integers:
     """Return the products (n,) of vectors (n, dim)."""
     product: Integers = (a * b).sum(axis=-1)
     return product
-
-
-def _cross(a: Integers, b: Integers) -> Integers:
-    return np.asarray(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
 
 
 def roots(squares: Integers) -> Integers:
@@ -350,12 +346,7 @@ class ExactFacePoints:
         first, second, third = np.moveaxis(lattice.nodes[lattice.slave[face]], 1, 0)
         arms = second - first, third - first
         place = below * first + shares[:, :1] * arms[0] + shares[:, 1:] * arms[1]
-        return cls(place, np.full(len(face), below, dtype=object), _cross_in_space(*arms))
-
-    @property
-    def positions(self) -> Ratios:
-        """The places (n_points, 3) on the lattice."""
-        return Ratios(self.place, self.weight[:, None])
+        return cls(place, np.full(len(face), below, dtype=object), np.cross(*arms))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -368,7 +359,9 @@ class FaceView:
     shape: Ratios  # (n_points, 3) The shape functions of the corners at the foot, unclipped.
     gap: Ratios  # (n_points,) A length, negative in penetration.
     normal: Ratios  # (n_points, 3) The unit normal out of the master.
-    cosine: FloatArray  # (n_points,) Of the angle between both normals that face each other; 1 for the closest point.
+    # (n_points,) Of the angle between both normals that face each other; 1 for the closest point. Where it is above 0,
+    # a point looks at the front of its master face.
+    cosine: FloatArray
     corners: FloatArray  # (n_points, 3, 3) The corners of the master triangle, from the point.
 
     @classmethod
@@ -383,7 +376,7 @@ class FaceView:
         sign = np.where(facing < 0, -1, 1).astype(object)
         below = sign * facing + (facing == 0)
         parts = np.stack(
-            [dot(direction, _cross_in_space(arms[:, k - 2], arms[:, k - 1])) for k in range(3)], axis=1
+            [dot(direction, np.cross(arms[:, k - 2], arms[:, k - 1])) for k in range(3)], axis=1
         )  # Twice the areas under the foot, seen along the direction.
         length = roots(dot(direction, direction))
         height = sign * dot(outward, arms[:, 0])
@@ -398,11 +391,6 @@ class FaceView:
         )
 
     @property
-    def faces_it(self) -> BoolArray:
-        """True for points (n_points,) that look at the front of their master face."""
-        return self.cosine > 0
-
-    @property
     def heights(self) -> FloatArray:
         """The least heights (n_points,) of the master triangles."""
         return measure_heights(self.corners)
@@ -410,14 +398,7 @@ class FaceView:
 
 def _outward(corners: Integers) -> Integers:
     """Return normals (n, 3), of any length, of triangles with corners (n, 3, 3)."""
-    return _cross_in_space(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-
-
-def _cross_in_space(a: Integers, b: Integers) -> Integers:
-    x = a[..., 1] * b[..., 2] - a[..., 2] * b[..., 1]
-    y = a[..., 2] * b[..., 0] - a[..., 0] * b[..., 2]
-    z = a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
-    return np.stack([x, y, z], axis=-1)
+    return np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
 
 
 def covered_shares(lattice: Lattice) -> list[Fraction]:
@@ -431,8 +412,8 @@ def covered_shares(lattice: Lattice) -> list[Fraction]:
         arms, whole = lattice.nodes[lattice.master] - first, dot(normal, normal)
         # The corners of the master in the plane of the triangle: 0 to `whole` along its first and its last edge.
         along, up = (
-            dot(_cross_in_space(arms, third - first), normal),
-            dot(_cross_in_space(second - first, arms), normal),
+            dot(np.cross(arms, third - first), normal),
+            dot(np.cross(second - first, arms), normal),
         )
         near = dot(front, normal) < 0
         near &= (along.min(axis=1) < whole) & (up.min(axis=1) < whole) & (along.max(axis=1) > 0) & (up.max(axis=1) > 0)

@@ -211,12 +211,12 @@ def _integrate_part(corners: FloatArray, part: FloatArray) -> FloatArray:
     u, v = np.meshgrid((1 + points) / 2, (1 + points) / 2, indexing="ij")
     b, c = part[1:-1] - part[0], part[2:] - part[0]  # (n_triangles, 2) Each has its points along rays from a corner.
     r = part[0] - corners[0] + u[..., None, None] * (b + v[..., None, None] * (c - b))
-    weights = np.outer(shares * (1 + points) / 2, shares)[..., None] / 4 * _cross(b, c)
+    weights = np.outer(shares * (1 + points) / 2, shares)[..., None] / 4 * cross(b, c)
     first, last = corners[1] - corners[0], corners[3] - corners[0]
     twist = corners[2] - corners[1] - last
     # A place is s first + t last + s t twist. Without s, that is a quadratic equation in t.
-    constant, linear = _cross(r, first), _cross(r, twist) + _cross(first, last)
-    root = np.sqrt(np.maximum(linear**2 + 4 * constant * _cross(last, twist), 0.0))
+    constant, linear = cross(r, first), cross(r, twist) + cross(first, last)
+    root = np.sqrt(np.maximum(linear**2 + 4 * constant * cross(last, twist), 0.0))
     t = -2 * constant / (linear + root)
     edge = first + t[..., None] * twist
     s = ((r - t[..., None] * last) * edge).sum(axis=-1) / (edge**2).sum(axis=-1)
@@ -224,7 +224,8 @@ def _integrate_part(corners: FloatArray, part: FloatArray) -> FloatArray:
     return np.asarray((shapes * weights).sum(axis=(1, 2, 3)))
 
 
-def _cross(a: FloatArray, b: FloatArray) -> FloatArray:
+def cross(a: FloatArray, b: FloatArray) -> FloatArray:
+    """Return the products (...) of vectors (..., 2): the area of their parallelogram, positive to the left of a."""
     return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])
 
 

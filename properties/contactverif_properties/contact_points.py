@@ -313,7 +313,7 @@ def _find_farther(each: Pass, reported: _Reported) -> tuple[FloatArray, int, str
 
 def _find_farther_face(each: Pass, reported: _Reported) -> tuple[FloatArray, int, str]:
     places = _FacePlaces.from_pass(each, reported)
-    counted = places.view.faces_it
+    counted = places.view.cosine > 0
     excess = places.excess(each.positions, str(reported.rule))
     if reported.rule != CLOSEST:
         outside = np.where(places.beside_border, 0.0, np.maximum(-places.depth_inside, 0.0)) * places.share
@@ -397,8 +397,8 @@ def _find_errors_on_faces(each: Pass, reported: _Reported) -> Iterator[FloatArra
     turned = 1 + reported.distant / places.carrier_height
     yield _size(np.linalg.norm(view.normal.errors(points.normal), axis=1) / turned, points.active)[facing]
     points = each.points.select(_name_places(each.points))
-    exact = exact_points.ExactFacePoints.at(places.lattice, points.slave_segment, points.slave_shape).positions
-    shifts = replace(exact, below=exact.below * places.lattice.scale).errors(points.position)
+    exact = exact_points.ExactFacePoints.at(places.lattice, points.slave_segment, points.slave_shape)
+    shifts = exact_points.positions(places.lattice, exact).errors(points.position)
     yield _size(np.abs(shifts).max(axis=1, initial=0.0), points.active) / reported.state.largest_coordinate
 
 
@@ -490,7 +490,7 @@ def _decide_on_faces(each: Pass, reported: _Reported) -> tuple[BoolArray, BoolAr
     places = _FacePlaces.from_pass(each, reported)
     points, gap, rounding = places.reported, places.view.gap.floats(), 4 * UNIT_ROUNDOFF * places.scale
     shallow = np.abs(gap) <= DEEP * (_longest_edges(places.view.corners) + places.slave_edges)
-    certain = places.view.faces_it & (points.weight != 0) & (np.abs(gap) > rounding) & shallow
+    certain = (places.view.cosine > 0) & (points.weight != 0) & (np.abs(gap) > rounding) & shallow
     return points.active, certain & (places.depth_inside > rounding), gap < 0
 
 

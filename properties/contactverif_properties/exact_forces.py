@@ -36,15 +36,12 @@ def worst_force(
     numbers, counted along the exact force, with their ratio; else the components of both.
     """
     node = int(np.linalg.norm(forces - exact, axis=1).argmax())
-    return _beside(describe_node(interface, node), forces[node], exact[node], names)
+    return show_force(describe_node(interface, node), forces[node], exact[node], names)
 
 
-def total_force(total: FloatArray, exact: FloatArray) -> Finding:
-    """Return the total force (dim,) on the slave beside the exact one, as `worst_force` does for a node."""
-    return _beside("all slave nodes together", total, exact, ("force", "exact"))
-
-
-def _beside(place: str, force: FloatArray, right: FloatArray, names: tuple[str, str]) -> Finding:
+def show_force(
+    place: str, force: FloatArray, right: FloatArray, names: tuple[str, str] = ("force", "exact")
+) -> Finding:
     """Return a force beside the one that is right: one number of each, and their ratio, if they lie on one line."""
     line = right if right.any() else force
     direction = line / np.linalg.norm(line)
@@ -285,7 +282,7 @@ def node_gaps(case: Case) -> FloatArray:
         along = corners[1] - corners[0]
         normal = np.array([along[1], -along[0]])
     else:
-        normal = _normal_of_face(corners)
+        normal = np.cross(*(corners[1:3] - corners[0]))
     heights = (_exact(case.positions[: case.interface.n_slave_nodes]) - corners[0]) @ normal
     return np.array([float(height) for height in heights]) / sqrt(normal @ normal)
 
@@ -294,7 +291,7 @@ def directions(case: Case) -> tuple[FloatArray, FloatArray]:
     """Return the unit normals (dim,) along the master's and along the slave's, both out of the master."""
     if case.interface.dim != PLANE:
         faces = [_largest_part(case, side) for side in (case.interface.master, case.interface.slave)]
-        of_master, of_slave = (_unit(_normal_of_face(corners)) for corners in faces)
+        of_master, of_slave = (_unit(np.cross(*(corners[1:3] - corners[0]))) for corners in faces)
         return of_master, -of_slave
     ends = _largest_part(case, case.interface.master), _exact(case.positions[case.interface.slave.segments[0]])
     (x, y), (x_slave, y_slave) = (second - first for first, second in ends)
@@ -355,12 +352,6 @@ def _depths(case: Case, traits: Traits) -> tuple[FloatArray, FloatArray]:
 def _largest_part(case: Case, surface: Surface) -> NDArray[Any]:
     """Return the exact ends or corners (n_corners, dim) of the longest segment, or the largest face, of a surface."""
     return _exact(case.positions[surface.faces[int(np.argmax(surface.measures(case.positions)))]])
-
-
-def _normal_of_face(corners: NDArray[Any]) -> NDArray[Any]:
-    """Return an exact normal (3,) of a flat face, of any length, out of its body."""
-    (a, b, c), (d, e, f) = corners[1] - corners[0], corners[2] - corners[0]
-    return np.array([b * f - c * e, c * d - a * f, a * e - b * d], dtype=object)
 
 
 def _unit(vector: NDArray[Any]) -> FloatArray:

@@ -131,7 +131,7 @@ def patch_flat_resultant(case: Case, subject: Subject) -> Measurement:
     value, tolerance = error / float(np.linalg.norm(exact)), roundoff.gap_tolerance(case, penetration)
     rounding = roundoff.COORDINATE_ROUNDING * case.largest_coordinate
     undecided = explain_by_kink(state, rounding, {"forces": error}) if value > tolerance else ""
-    finding, action = exact_forces.total_force(total, exact), ""
+    finding, action = exact_forces.show_force("all slave nodes together", total, exact), ""
     if np.linalg.norm(total - other) <= tolerance * np.linalg.norm(other):
         action = f"on a reference {stretch:g} times as long"  # It explains no other force.
         finding = replace(finding, remark=f"the force follows the {follows} area, and area={rule!r} is promised")

@@ -27,7 +27,7 @@ from contactverif_properties.exact_forces import (
     exact_slave_forces,
     forces_of_penetration,
     node_gaps,
-    total_force,
+    show_force,
     weighted_forces,
     worst_force,
 )
@@ -468,5 +468,5 @@ def test_a_force_aside_has_both_components() -> None:
 
 
 def test_nothing_beside_a_force_has_no_ratio() -> None:
-    finding = total_force(np.array([0.0, 2.0]), np.zeros(2))
+    finding = show_force("", np.array([0.0, 2.0]), np.zeros(2))
     assert (finding.found, finding.right, finding.remark) == ((2.0,), (0.0,), "")
