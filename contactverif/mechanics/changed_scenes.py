@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 
 from contactverif.contract.arrays import FloatArray, IntArray
-from contactverif.contract.body import Body
 from contactverif.contract.errors import MisuseError
 from contactverif.contract.interface import SPACE, Interface
 from contactverif.mechanics.bulk import SCENES_SIZE
@@ -127,8 +126,3 @@ def renumber(scene: Scene, random: np.random.Generator) -> tuple[Scene, tuple[In
 def exchange_roles(scene: Scene) -> Scene:
     """Return the scene whose slaves are the masters, and the other way round; its facts are left out."""
     return replace(scene, slave=scene.master, master=scene.slave, facts={})
-
-
-def add_body(scene: Scene, body: Body) -> Scene:
-    """Return the scene with one more slave, behind all other bodies; its facts are left out."""
-    return replace(scene, bodies=(*scene.bodies, body), slave=(*scene.slave, len(scene.bodies)), facts={})

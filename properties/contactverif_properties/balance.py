@@ -227,12 +227,6 @@ SLOPE = Quantity(
 Function = Callable[[FloatArray], FloatArray]
 
 
-def _refuse_unstated_continuity(traits: Traits) -> str:
-    if traits.rules.enforcement == "multiplier":
-        return "multipliers would change on the way, and here nothing is solved"
-    return refuse_unstated(traits, "continuity", group="promises")
-
-
 @Property.define(
     id="continuity",
     rank=270,
@@ -241,7 +235,11 @@ def _refuse_unstated_continuity(traits: Traits) -> str:
     cases=Cases.random(sliding_cases),
     cases_in_space=Cases.random(sliding_surface_cases),
     promise=lambda traits: None if traits.promises.continuity is None else traits.promises.continuity != "jumps",
-    applicable=_refuse_unstated_continuity,
+    applicable=lambda traits: (
+        "multipliers would change on the way, and here nothing is solved"
+        if traits.rules.enforcement == "multiplier"
+        else refuse_unstated(traits, "continuity", group="promises")
+    ),
 )
 def continuity(case: Case, subject: Subject) -> Measurement:
     """Forces, or their slopes too, are continuous while a slave slides over the vertices of the master.

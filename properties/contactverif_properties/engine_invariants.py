@@ -227,5 +227,5 @@ def engine_remote(case: Case, subject: Subject) -> Measurement:
     else:  # A copy of the slave, whose far side is held where it is.
         slave = scene.bodies[scene.slave[0]]
         far = replace(slave, nodes=slave.nodes + DISTANCE * size * slave.frame[:, 0], imposed=0 * slave.imposed)
-    changed = changed_scenes.add_body(scene, far)
+    changed = replace(scene, bodies=(*scene.bodies, far), slave=(*scene.slave, len(scene.bodies)), facts={})
     return _compare_scenes(case, subject, changed, f"beside a block {DISTANCE:g} sizes away")

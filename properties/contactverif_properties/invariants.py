@@ -251,12 +251,9 @@ def swap(case: Case, subject: Subject) -> Measurement:
     choice is natural. A formulation without that choice promises `unbiased`. All others give another answer, by as much
     as the detail says.
 
-    **How it is judged.** Changes of the forces count over Σ|R| of the slave, those of a tangent that is called exact
-    over max|K|. The penalty stays the same number, also for nodal springs. The tolerance is u(8Z/min(g, ℓ) + 4N),
-    because sums run in another order. Multipliers are uniform, because their order changes.
+    **How it is judged.** As in `mirror`. The penalty stays the same number, also for nodal springs.
 
-    **Undecided.** A failing case of a formulation that promises `unbiased` is undecided where the state lies at a kink,
-    or where moving the nodes by 64 u X changes the answer by a quarter of the error or more.
+    **Undecided.** As in `mirror`, for a formulation that promises `unbiased`.
     """
     interface, unbiased = case.interface, bool(subject.traits.promises.unbiased)
     nodes = np.roll(np.arange(interface.n_nodes), -interface.n_slave_nodes).argsort()
@@ -290,14 +287,10 @@ def renumbering(case: Case, subject: Subject) -> Measurement:
     **Why it matters.** A mesh generator numbers as it likes. A formulation that takes the next number for the next
     segment is right on one mesh and wrong on the same mesh from another program, or at the one seam of a ring.
 
-    **How it is judged.** Changes of the forces count over Σ|R| of the slave, those of a tangent that is called exact
-    over max|K|. The tolerance is u(8Z/min(g, ℓ) + 4N), because sums run in another order. Multipliers are uniform,
-    because their order changes.
+    **How it is judged.** As in `mirror`: sums run in another order, and that of multipliers changes.
 
-    **Undecided.** A failing case is undecided where the state lies at a kink, or where moving the nodes by 64 u X
-    changes the answer by a quarter of the error or more. On an exact bisector, and in the normal cone of a re-entrant
-    vertex, a point is as near to one segment as to another, and the number of a segment may decide. In such a cone the
-    state is asked again, with other numbers of nodes alone.
+    **Undecided.** As in `mirror`: where a point is as near to one segment as to another, the number of a segment may
+    decide. In the normal cone of a re-entrant vertex the state is asked again, with other numbers of nodes alone.
     """
     interface, random = case.interface, np.random.default_rng([case.seed, 2])
 

@@ -456,8 +456,7 @@ def patch_flat_single_solve(case: Case, subject: Subject) -> Measurement:
     moduli that differ by 1/8 to 1000, inclined, and 1/500 as large. Errors and tolerances are those of
     `patch.flat.solve`. The promise is that of `patch.flat.single`.
 
-    **Undecided.** Never, as in `patch.flat.solve`. No slave node faces a free end of the master but in upright scenes
-    of the paper, whose coordinates along the interface are exact.
+    **Undecided.** Never, as in `patch.flat.normal.solve`.
 
     **Source.** Zavarise & De Lorenzis (2009), Figs. 16 to 19 and 31, Sections 5.1.2 and 7.1.
     """
