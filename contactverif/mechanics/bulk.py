@@ -9,7 +9,7 @@ Rule for the next editor: the stiffness knows nothing of any contact formulation
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cache, lru_cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import skfem
@@ -43,8 +43,7 @@ _MOTIONS = {
 }
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Matrices:
+class _Matrices(NamedTuple):
     """The matrices that follow from mesh, material and supports of a body; loads have no part in them."""
 
     unknowns: IntArray  # (n,) The free components on the contact boundary.

@@ -7,8 +7,7 @@ Rule for the next editor: no other singular system is solved. A step that a sing
 worse than none, because it looks like a solution.
 """
 
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy import linalg, sparse
@@ -27,8 +26,7 @@ _FAR_FROM_SINGULAR = 2.0**-20
 _LARGE, _ORDERING = 10_000, {"permc_spec": "MMD_AT_PLUS_A"}
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Step:
+class Step(NamedTuple):
     """The answer of a linear system."""
 
     change: FloatArray | None  # (n,) The step; None if the matrix has no inverse in floats.

@@ -8,12 +8,11 @@ formulation reports is rounded, and nothing here reads it.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from fractions import Fraction
 from functools import partial
 from itertools import pairwise
 from math import isqrt
-from typing import Any, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,8 +27,7 @@ Integers = NDArray[Any]  # An array of Python integers of any size.
 ROOT_SHIFT = 128  # The bits of a root behind the lattice's own.
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Lattice:
+class Lattice(NamedTuple):
     """The nodes of a state as integers."""
 
     nodes: Integers  # (n_nodes, dim) Positions × `scale`.
@@ -45,8 +43,7 @@ class Lattice:
         return cls(nodes, scale, interface.slave.faces, interface.master.faces)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class ExactPoints:
+class ExactPoints(NamedTuple):
     """Points of slave segments: (X, Y)/W on the lattice."""
 
     place: Integers  # (n_points, 2) X and Y.
@@ -72,8 +69,7 @@ class ExactPoints:
         return type(self)(self.place[numbers], self.weight[numbers], self.along[numbers])
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Ratios:
+class Ratios(NamedTuple):
     """Exact numbers above/below, with below > 0; arrays of any shape that broadcast."""
 
     above: Integers
@@ -96,8 +92,7 @@ class Ratios:
         return np.array([a / b for a, b in pairs], dtype=np.float64).reshape(above.shape)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class View:
+class View(NamedTuple):
     """The numbers that points see of one master segment each, by one of the two rules."""
 
     # (n_points,) The foot, 0 at the first node of the segment and 1 at its second, unclipped; and the gap, a length,
@@ -269,8 +264,7 @@ def overlaps(lattice: Lattice, slave_segment: IntArray, segments: IntArray) -> t
     return np.maximum(low, -squared), np.minimum(high, squared), squared
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Coverage:
+class Coverage(NamedTuple):
     """The part of each slave segment that sees the master along the slave's normal."""
 
     share: Ratios  # (n_slave_segments,) The covered share of the segment's length, from 0 to 1 where it is clear.
@@ -327,8 +321,7 @@ def lies_in_shadow(lattice: Lattice, interface: Interface) -> bool:
 _UNIT_TRIANGLE = [(Fraction(0), Fraction(0)), (Fraction(1), Fraction(0)), (Fraction(0), Fraction(1))]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class ExactFacePoints:
+class ExactFacePoints(NamedTuple):
     """Points of slave triangles: place/weight on the lattice, with the outward normals of these triangles."""
 
     place: Integers  # (n_points, 3)
@@ -349,8 +342,7 @@ class ExactFacePoints:
         return cls(place, np.full(len(face), below, dtype=object), np.cross(*arms))
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class FaceView:
+class FaceView(NamedTuple):
     """The numbers that points see of one master triangle each.
 
     They look along the normal of their slave triangle, or, by the closest point, along that of the master triangle.

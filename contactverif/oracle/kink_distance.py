@@ -4,7 +4,7 @@ Rule for the next editor: the bound must be conservative, since a case within it
 judged. The derivation is in `kink_margin`; a new decision of formulations needs a margin of its own.
 """
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -74,8 +74,7 @@ def kink_margin(
     return max(margin, 0.0)
 
 
-@dataclass(frozen=True, slots=True)
-class _Line:
+class _Line(NamedTuple):
     """The segments of the master in floats."""
 
     first: FloatArray  # (n_segments, 2), as are the second ends and the tangents.

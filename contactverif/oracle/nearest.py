@@ -6,7 +6,6 @@ first, then by number.
 """
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 from fractions import Fraction
 from typing import NamedTuple
 
@@ -71,8 +70,7 @@ def nearest_of(reaches: Iterable[Reach]) -> list[Reach]:
 _DOUBT = 64 * UNIT_ROUNDOFF
 
 
-@dataclass(frozen=True, slots=True)
-class NearSegment:
+class NearSegment(NamedTuple):
     """A segment at the smallest distance from a point."""
 
     segment: int  # Its number.
@@ -86,8 +84,7 @@ class NearSegment:
     foot: tuple[str, int]
 
 
-@dataclass(frozen=True, slots=True)
-class Nearest:
+class Nearest(NamedTuple):
     """The exact distance of a point from a surface, and where it is taken."""
 
     squared_distance: Fraction  # The square of the distance to the nearest closed segment.

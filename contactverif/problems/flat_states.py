@@ -12,6 +12,7 @@ from functools import cache, partial, wraps
 from itertools import accumulate, cycle, pairwise, product
 from math import cos, ldexp, radians, sin
 from operator import mul
+from typing import NamedTuple
 
 import numpy as np
 
@@ -54,8 +55,7 @@ Turn = tuple[int, int, int]  # Legs p, q and hypotenuse r: a unit of the frame a
 UPRIGHT, TURNED, STEEP = (1, 0, 1), (4, 3, 5), (-5, 12, 13)
 
 
-@dataclass(frozen=True, slots=True)
-class Master:
+class Master(NamedTuple):
     """The master in the frame: all its chains, of which one has the flat part that the slave penetrates."""
 
     points: Sequence[tuple[float, float]]  # The nodes: their places along the flat part and their heights above it.

@@ -21,7 +21,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cache, partial
 from math import inf, pi
-from typing import Literal, Self
+from typing import Literal, NamedTuple, Self
 
 import numpy as np
 
@@ -42,8 +42,7 @@ LAYERS = {"inner": 3, "outer": 6}  # Numbers of layers of cells across each ring
 _FACTS = ("inner_radius", "radius", "outer_radius", "young", "poisson", "interference")  # The attributes of ShrinkFit.
 
 
-@dataclass(frozen=True, slots=True)
-class FiniteFit:
+class FiniteFit(NamedTuple):
     """The fit of two rings, measured where they are after it."""
 
     force: float  # The force on the slave for each unit of angle, pressure times radius.

@@ -14,7 +14,7 @@ displacement; ℓ is the shortest segment; p is the exact pressure.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -65,8 +65,7 @@ def condition_tolerance(scene: Scene, penalty: float) -> float:
     return 1e-11 + 1e-13 * max(penalty * h, *young) / min(young) + 5e-15 / _segment_lengths(scene)[1]
 
 
-@dataclass(frozen=True, slots=True)
-class UniformTolerances:
+class UniformTolerances(NamedTuple):
     """The tolerances of a solved patch test in one state, all dimensionless."""
 
     stress: float  # STRESS_TOLERANCE, for stresses over p and nodal forces over p L.

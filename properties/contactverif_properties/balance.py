@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 
@@ -328,8 +329,7 @@ def find_jumps(function: Function, samples: FloatArray, halvings: int, allowed: 
     return sorted(jumps, key=lambda jump: -jump[1])
 
 
-@dataclass(frozen=True, slots=True)
-class _Bracket:
+class _Bracket(NamedTuple):
     """A part of the way."""
 
     left: float  # Its ends, from 0 to 1.

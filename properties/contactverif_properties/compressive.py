@@ -7,9 +7,10 @@ area is what a unit of the multiplier pushes the slave by, and 1 for a nodal for
 
 from collections import defaultdict
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from itertools import chain, pairwise
+from typing import NamedTuple
 
 import numpy as np
 from hypothesis.strategies import SearchStrategy
@@ -39,8 +40,7 @@ N_MOVES = 64  # The number of moves by roundoff that are tried where a point may
 MOVED = 32.0  # Such a move of both surfaces changes a gap by 181 uX, which is 23 tolerances.
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Constraints:
+class _Constraints(NamedTuple):
     """The constraint rows of a flat interface with a uniform gap, as the contract states them."""
 
     rules: Rules

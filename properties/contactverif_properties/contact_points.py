@@ -7,9 +7,10 @@ reported position is rounded at its distance from the origin, and serves for not
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from math import sqrt
+from typing import NamedTuple
 
 import numpy as np
 from hypothesis import strategies as st
@@ -45,8 +46,7 @@ LOCAL_REASON = (
 FOOT_REASON = LOCAL_REASON + " Rounding the ends of a segment turns it by uD/ℓ, which moves a foot by |gap| uD/ℓ."
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Reported:
+class _Reported(NamedTuple):
     state: Case  # With multipliers, if the formulation has any.
     forces: FloatArray  # The position rows of the residual, of shape (n_nodes, dim).
     points: ContactPoints
@@ -83,8 +83,7 @@ class _Reported:
         return not self.points.active.any()
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Places:
+class _Places(NamedTuple):
     """The points of a pass that name a place on a slave segment and a master segment.
 
     A scale is the length of which rounding is a share: L + |P − A|, plus D or X, at which a point may be rounded, over
@@ -156,8 +155,7 @@ _define = partial(
 )
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _FacePlaces:
+class _FacePlaces(NamedTuple):
     """The points of a pass that name a place on a slave face and a master face, and what is exact there."""
 
     interface: Interface  # In the roles of the pass.

@@ -487,8 +487,7 @@ ERROR = Quantity(
 )
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Solution:
+class Solution(NamedTuple):
     """The solution of the scene near the origin, and what roundoff may do to it."""
 
     system: System  # The scene with its formulation.

@@ -12,6 +12,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import chain, combinations, permutations, product
+from typing import NamedTuple
 
 import numpy as np
 from scipy import sparse
@@ -106,8 +107,7 @@ def _groups_of(case: Case) -> Groups:
     return Groups(case.interface.n_slave_nodes, case.interface.n_nodes, case.n_multipliers, case.interface.dim)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Moves:
+class Moves(NamedTuple):
     """Sets of unknowns that move together."""
 
     members: Sequence[IntArray]  # The unknowns of each move.
@@ -243,8 +243,7 @@ def _over(errors: FloatArray, sizes: FloatArray) -> FloatArray:
         return np.where(errors > 0, errors / sizes, 0.0)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class BlockJudge:
+class BlockJudge(NamedTuple):
     """The tangent of a state, and how it is compared with the derivative of the residual."""
 
     state: FrozenState
@@ -486,8 +485,7 @@ def _excuse(judge: BlockJudge, comparison: _Comparison) -> tuple[FloatArray, int
     return excess, kinked, bent
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Sides:
+class _Sides(NamedTuple):
     """One-sided differences of some rows and columns, in doubles or better."""
 
     ahead: FloatArray  # (n_steps, n_columns, n_rows) The differences to both sides, for the steps in STEPS.
