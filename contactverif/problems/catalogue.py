@@ -74,30 +74,26 @@ _PUNCH = partial(
     master_from=-6.0,
     pressure=1.0,
 )
+_ON_FOUR = partial(NamedBlocks, assumptions=_MATERIAL, slave=[2, 2, 4, 4])
 BLOCKS: Mapping[str, NamedBlocks] = {
     "a1": NamedBlocks("two slave segments over one master segment", "case test A1, Fig. 8", _MATERIAL, [2, 2], [4]),
     "a2-uniform": _ON_A_FLOOR("a uniform mesh on a rigid floor", "case test A2, Fig. 11(a)", slave=[2, 2, 2, 2, 2]),
     "a2-graded": _ON_A_FLOOR("a graded mesh on a rigid floor", "case test A2, Fig. 11(c)", slave=[1, 2, 3, 4]),
-    "b": NamedBlocks(
+    "b": _ON_FOUR(
         "non-matching; each area of competence lies over one master segment",
         "case test B, Fig. 16",
-        _MATERIAL,
-        [2, 2, 4, 4],
-        [3, 3, 4, 2],
+        master=[3, 3, 4, 2],
     ),
-    "c": NamedBlocks(
+    "c": _ON_FOUR(
         "non-matching; one area of competence lies over a master node, its virtual slave node on it",
         "case test C, Fig. 20",
-        _MATERIAL,
-        [2, 2, 4, 4],
-        [3, 3, 3, 3],
+        master=[3, 3, 3, 3],
     ),
-    "c-prime": NamedBlocks(
+    "c-prime": _ON_FOUR(
         "c with no virtual slave node on a master node",
         "case test C, lower lengths changed",
-        f"the last two lower lengths; {_MATERIAL}",
-        [2, 2, 4, 4],
-        [3, 3, 3.2, 2.8],
+        assumptions=f"the last two lower lengths; {_MATERIAL}",
+        master=[3, 3, 3.2, 2.8],
     ),
     "example-1": _PUNCH(
         "Taylor and Papadopoulos' punch; each area of competence lies over one master segment",

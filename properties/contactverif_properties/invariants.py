@@ -18,15 +18,7 @@ from contactverif.contract.arrays import FloatArray, IntArray
 from contactverif.contract.case import Case, Cases, random_source
 from contactverif.contract.errors import NonFiniteError
 from contactverif.contract.interface import PLANE, QUADRILATERAL, TRIANGLE, Interface, Surface, unit_normals
-from contactverif.contract.property import (
-    WITH_BARRIER,
-    WITHOUT_BARRIER,
-    CheckedNumber,
-    Measurement,
-    Property,
-    Quantity,
-    check_all,
-)
+from contactverif.contract.property import WITH_BARRIER, WITHOUT_BARRIER, Measurement, Property, Quantity, check_all
 from contactverif.contract.subject import Subject
 from contactverif.contract.traits import Traits
 from contactverif.oracle.kink_distance import default_points
@@ -95,8 +87,8 @@ class _Change(NamedTuple):
 
 def _judge_changes(
     changes: Sequence[_Change], tolerance: float, states: Iterable[FrozenState], largest: float | None = None
-) -> tuple[tuple[CheckedNumber, ...], str]:
-    """Return the largest changes over their sizes, and why a kink excuses those above the tolerance.
+) -> Measurement:
+    """Judge the largest changes over their sizes; undecided where a kink excuses those above the tolerance.
 
     Coordinates are rounded at the largest one of each state, or at a length. Without states, nothing is excused.
     """
@@ -108,7 +100,7 @@ def _judge_changes(
         columns = failures["tangent"].worst_columns(number) if "tangent" in failures else None
         reach = roundoff.COORDINATE_ROUNDING * (largest or state.case.largest_coordinate)
         undecided = undecided or explain_by_kink(state, reach, errors, columns)
-    return check_all(values, tolerance), undecided
+    return Measurement(check_all(values, tolerance), undecided)
 
 
 def _compare(
@@ -141,16 +133,16 @@ def _compare(
         changes.append(_Change("tangent", question.quantities[1], change, size, carry.nodes, dim))
     distance = max(roundoff.rounding_distance(state, subject.traits) for state in (case, other))
     tolerance = roundoff.segment_tolerance(case, forces, distance)
-    numbers, undecided = _judge_changes(changes, tolerance, [first, second] if explain else [])
-    if explain and not undecided and any(number.value > number.tolerance for number in numbers):
+    measurement, finding = _judge_changes(changes, tolerance, [first, second] if explain else []), None
+    fails = any(number.value > number.tolerance for number in measurement.numbers)
+    if explain and fails and not measurement.undecided:
         # A point that is active in one state may be tied to a segment for which it is open, and be open in the other.
-        undecided = _find_tie(first) or _find_tie(second)
-    finding = None
-    if numbers[0].ratio > 1:
+        measurement = replace(measurement, undecided=_find_tie(first) or _find_tie(second))
+    if measurement.numbers[0].ratio > 1:
         finding = worst_force(case.interface, forces_there[carry.nodes] @ carry.matrix, forces, CHANGED)
     details = {BITS: float(sum(np.count_nonzero(each.change) for each in changes))}
     idle = not (forces.any() or forces_there.any())
-    return Measurement(numbers, undecided, details=details, idle=idle).after(action, finding=finding)
+    return replace(measurement, details=details, idle=idle).after(action, finding=finding)
 
 
 def _find_tie(state: FrozenState) -> str:
@@ -544,7 +536,7 @@ def units(case: Case, subject: Subject) -> Measurement:
             _Change("tangent", SCALED_TANGENT, tangent_there - tangent, float(np.abs(tangent).max()), dim=dim)
         )
     tolerance = roundoff.segment_tolerance(case, forces, roundoff.rounding_distance(case, subject.traits))
-    measurement = Measurement(*_judge_changes(changes, tolerance, [state]), idle=not forces.any())
+    measurement = replace(_judge_changes(changes, tolerance, [state]), idle=not forces.any())
     return measurement.after(f"with all lengths times {factor:.4g}")
 
 
@@ -612,6 +604,6 @@ def objectivity(case: Case, subject: Subject) -> Measurement:
         size = float(np.abs(tangent).max())
         changes.append(_Change("tangent", TURNED_TANGENT, change, size, dim=case.interface.dim))
     # Slivers may cost more digits in one place than in the other, so that both are looked at.
-    numbers, undecided = _judge_changes(changes, tolerance, [state, there], largest)
+    measurement = _judge_changes(changes, tolerance, [state, there], largest)
     turned = np.degrees(np.arccos(np.clip((np.trace(rotation) - rotation.shape[0] + 2) / 2, -1, 1)))
-    return Measurement(numbers, undecided, idle=not forces[:n].any()).after(f"turned by {turned:.4g}° and shifted")
+    return replace(measurement, idle=not forces[:n].any()).after(f"turned by {turned:.4g}° and shifted")
