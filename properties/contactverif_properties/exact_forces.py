@@ -278,27 +278,18 @@ def uniform_multiplier(case: Case) -> float:
 def node_gaps(case: Case) -> FloatArray:
     """Return the gaps (n_slave_nodes,) of the slave's nodes along the master's normal, each rounded once."""
     corners = _largest_part(case, case.interface.master)
-    if case.interface.dim == PLANE:  # All master segments lie on its line.
-        along = corners[1] - corners[0]
-        normal = np.array([along[1], -along[0]])
-    else:
-        normal = np.cross(*(corners[1:3] - corners[0]))
+    normal = _normal(corners)  # All master segments or faces lie on its line or plane.
     heights = (_exact(case.positions[: case.interface.n_slave_nodes]) - corners[0]) @ normal
     return np.array([float(height) for height in heights]) / sqrt(normal @ normal)
 
 
 def directions(case: Case) -> tuple[FloatArray, FloatArray]:
     """Return the unit normals (dim,) along the master's and along the slave's, both out of the master."""
-    if case.interface.dim != PLANE:
-        faces = [_largest_part(case, side) for side in (case.interface.master, case.interface.slave)]
-        of_master, of_slave = (_unit(np.cross(*(corners[1:3] - corners[0]))) for corners in faces)
-        return of_master, -of_slave
-    ends = _largest_part(case, case.interface.master), _exact(case.positions[case.interface.slave.segments[0]])
-    (x, y), (x_slave, y_slave) = (second - first for first, second in ends)
-    return (
-        np.array([float(y), -float(x)]) / sqrt(x * x + y * y),
-        np.array([-float(y_slave), float(x_slave)]) / sqrt(x_slave * x_slave + y_slave * y_slave),
-    )
+    slave, in_plane = case.interface.slave, case.interface.dim == PLANE
+    on_slave = _exact(case.positions[slave.segments[0]]) if in_plane else _largest_part(case, slave)
+    normals = map(_normal, (_largest_part(case, case.interface.master), on_slave))
+    of_master, of_slave = (np.array([float(entry) for entry in each]) / sqrt(each @ each) for each in normals)
+    return of_master, -of_slave
 
 
 def exact_slave_forces(case: Case, traits: Traits) -> FloatArray:
@@ -354,8 +345,12 @@ def _largest_part(case: Case, surface: Surface) -> NDArray[Any]:
     return _exact(case.positions[surface.faces[int(np.argmax(surface.measures(case.positions)))]])
 
 
-def _unit(vector: NDArray[Any]) -> FloatArray:
-    return np.array([float(entry) for entry in vector]) / sqrt(vector @ vector)
+def _normal(corners: NDArray[Any]) -> NDArray[Any]:
+    """Return an exact normal (dim,) of a segment or of a flat face, of any length, out of its body."""
+    if corners.shape[1] != PLANE:
+        return np.cross(*(corners[1:3] - corners[0]))
+    x, y = corners[1] - corners[0]
+    return np.array([y, -x])
 
 
 def _exact(points: FloatArray) -> NDArray[Any]:

@@ -225,7 +225,11 @@ def conditioning_of(case: Case, derivative: FloatArray, forces: Array) -> Condit
     inputs = np.concatenate([_distances(case), np.abs(case.multipliers)])
     sizes = _row_sizes(forces, n_nodes, dim)
     floor = np.repeat([sizes[:n_nodes].max(), sizes[n_nodes:].max(initial=0.0)], [n_nodes, case.n_multipliers])
-    return Conditioning(_block_norms(derivative, n_nodes, dim) @ inputs + floor, floor, dim)
+    # The Frobenius norms of the blocks of the derivative, first of their rows, then of their columns.
+    n = dim * n_nodes
+    rows = np.vstack([reduce(np.hypot, [derivative[axis:n:dim] for axis in range(dim)]), derivative[n:]])
+    norms = np.hstack([reduce(np.hypot, [rows[:, axis:n:dim] for axis in range(dim)]), np.abs(rows[:, n:])])
+    return Conditioning(norms @ inputs + floor, floor, dim)
 
 
 def difference_quotient(state: FrozenState) -> FloatArray:
@@ -291,13 +295,6 @@ def _row_sizes(rows: Array, n_nodes: int, dim: int) -> FloatArray:
     """Return |R_a| of each node and |row| of each constraint row, (n_nodes + n_multipliers,)."""
     forces = np.hypot.reduce(np.asarray(rows[: dim * n_nodes], dtype=np.float64).reshape(n_nodes, dim), axis=1)
     return np.concatenate([forces, np.abs(rows[dim * n_nodes :]).astype(np.float64)])
-
-
-def _block_norms(matrix: FloatArray, n_nodes: int, dim: int) -> FloatArray:
-    """Return the Frobenius norms of the blocks of a matrix, (n_nodes + n_multipliers,) in rows and in columns."""
-    n = dim * n_nodes
-    rows = np.vstack([reduce(np.hypot, [matrix[axis:n:dim] for axis in range(dim)]), matrix[n:]])
-    return np.hstack([reduce(np.hypot, [rows[:, axis:n:dim] for axis in range(dim)]), np.abs(rows[:, n:])])
 
 
 def make_sweep_measurement(
