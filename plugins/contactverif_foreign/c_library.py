@@ -287,18 +287,34 @@ class LibraryElements(TangentOfBoth, LibraryForces):
 
 def c(
     *,
-    penalty: float,  # The stiffness, nodal or distributed, as the trait `penalty` says.
-    file: str,  # The shared library, absolute or relative to the working folder.
-    # "segment": an element is a slave segment with the part of a master chain near it. "interface": it is all nodes.
+    penalty: float,
+    file: str,
     elements: Literal["segment", "interface"] = "segment",
-    order: Literal["row", "column"] = "row",  # That of the tangent: row by row as in C, or column by column.
-    tangent: bool = True,  # False for a library that computes no tangent; it gets NULL in place of one.
-    props: float | str = "",  # The numbers that the library gets as `props`, with ":" between them.
-    # A TOML file with the traits. Without it `cv_traits` counts, and without that the file beside the library, see
-    # `traits_beside`.
+    order: Literal["row", "column"] = "row",
+    tangent: bool = True,
+    props: float | str = "",
     traits: str = "",
 ) -> LibraryForces:
-    """Load a formulation from a shared library with the functions of `contactverif.h`."""
+    """Load a formulation from a shared library with the functions of `contactverif.h`.
+
+    Parameters
+    ----------
+    penalty : float
+        The stiffness, nodal or distributed, as the trait `penalty` says.
+    file : str
+        The shared library, absolute or relative to the working folder.
+    elements : Literal["segment", "interface"]
+        "segment": an element is a slave segment with the part of a master chain near it. "interface": it is all nodes.
+    order : Literal["row", "column"]
+        The order of the tangent: row by row as in C, or column by column as in Fortran.
+    tangent : bool
+        False for a library that computes no tangent; it gets NULL in place of one.
+    props : float | str
+        The numbers that the library gets as `props`, with ":" between them.
+    traits : str
+        A TOML file with the traits. Without it `cv_traits` counts, and without that the file beside the library, see
+        `traits_beside`.
+    """
     check_penalty(penalty)
     path = shared_library.find_file(file)
     make = LibraryElements if tangent else LibraryForces

@@ -80,17 +80,27 @@ class FedooContact(TangentOfBoth):
         return contact.current
 
 
-def fedoo(
-    *,
-    penalty: float,  # The stiffness eps_n at a slave node, a force per length.
-    kind: str,  # The search: "bucket", the default of fedoo, "search_nearest", or "ipctk", which needs that library.
-    # The distance max_dist over the longest master segment in the reference configuration. A slave node that is farther
-    # from all master nodes is not in contact. The default of fedoo is 0.5 in the unit of the mesh, which is no choice
-    # for meshes of all sizes.
-    reach: float = inf,
-    tol: float = 0.1,  # The part of an element by which a foot may lie past its end; the default is that of fedoo.
-) -> FedooContact:
-    """Return the node-to-surface contact of the library fedoo with its linear law."""
+def fedoo(*, penalty: float, kind: str, reach: float = inf, tol: float = 0.1) -> FedooContact:
+    """Return the node-to-surface contact of the library fedoo with its linear law.
+
+    Parameters
+    ----------
+    penalty : float
+        The stiffness eps_n at a slave node, a force per length.
+    kind : str
+        The search: "bucket", which is the default of fedoo, "search_nearest", or "ipctk", which needs that library.
+    reach : float
+        The distance max_dist over the longest master segment in the reference configuration. A slave node that is
+        farther from all master nodes is not in contact. The default of fedoo is 0.5 in the unit of the mesh, which is
+        no choice for meshes of all sizes.
+    tol : float
+        The part of an element by which a foot may lie past its end; the default is that of fedoo.
+
+    Raises
+    ------
+    MisuseError
+        If there is no such search, or a library is not installed.
+    """
     for package in choose("kind", kind, _SEARCHES):
         if find_spec(package) is None:
             raise MisuseError(package, "no such package", "pip install 'contactverif[fedoo]'")

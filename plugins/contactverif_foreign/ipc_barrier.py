@@ -70,14 +70,25 @@ class IpcBarrier:
         return self.activation * min(float(side.lengths(interface.nodes).min()) for side in sides)
 
 
-def ipctk(
-    *,
-    penalty: float,  # The stiffness κ of the barrier, which the library makes physical by d̂.
-    kind: str,  # The collision set: "ipc" (Li et al. 2020), "improved" (Li et al. 2023) or "ogc" (Chen et al. 2025).
-    activation: float = 0.5,  # The activation distance d̂ over the shortest segment in the reference configuration.
-    areas: bool = True,  # Weight nodes by half of their segments, as Li et al. (2023) do.
-) -> IpcBarrier:
-    """Return a barrier of the library ipctk."""
+def ipctk(*, penalty: float, kind: str, activation: float = 0.5, areas: bool = True) -> IpcBarrier:
+    """Return a barrier of the library ipctk.
+
+    Parameters
+    ----------
+    penalty : float
+        The stiffness κ of the barrier, which the library makes physical by d̂.
+    kind : str
+        The collision set: "ipc" (Li et al. 2020), "improved" (Li et al. 2023) or "ogc" (Chen et al. 2025).
+    activation : float
+        The activation distance d̂ over the shortest segment in the reference configuration.
+    areas : bool
+        Weight nodes by half of their segments, as Li et al. (2023) do.
+
+    Raises
+    ------
+    MisuseError
+        If there is no such collision set, or ipctk is not installed.
+    """
     collision_set = choose("kind", kind, _SETS)
     if find_spec("ipctk") is None:
         raise MisuseError("ipctk", "no such package", "pip install 'contactverif[ipctk]'")

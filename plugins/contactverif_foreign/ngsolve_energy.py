@@ -100,16 +100,26 @@ class NGSolveContact:
         return self._ng.Mesh(mesh)
 
 
-def ngsolve(
-    *,
-    penalty: float,  # The stiffness ε̂, a force per length per length of depth.
-    kind: str,  # What NGSolve is given: the "energy" of springs, or their "work" in a virtual displacement.
-    order: int = 5,  # The order of integration on each slave segment, ≥ 0.
-    # The largest distance of a place from its point, over the longest master segment in the reference configuration.
-    # NGSolve has no default; a far body with long segments would change a finite one.
-    reach: float = inf,
-) -> NGSolveContact:
-    """Return the contact of NGSolve with the energy ε̂/2 × depth²."""
+def ngsolve(*, penalty: float, kind: str, order: int = 5, reach: float = inf) -> NGSolveContact:
+    """Return the contact of NGSolve with the energy ε̂/2 × depth².
+
+    Parameters
+    ----------
+    penalty : float
+        The stiffness ε̂, a force per length per length of depth.
+    kind : str
+        What NGSolve is given: the "energy" of springs, or their "work" in a virtual displacement.
+    order : int
+        The order of integration on each slave segment, ≥ 0.
+    reach : float
+        The largest distance of a place from its point, over the longest master segment in the reference configuration.
+        NGSolve has no default; a far body with long segments would change a finite one.
+
+    Raises
+    ------
+    MisuseError
+        If there is no such kind, NGSolve is not installed, or the order is negative.
+    """
     is_energy = choose("kind", kind, {"energy": True, "work": False})
     if find_spec("ngsolve") is None:
         raise MisuseError("ngsolve", "no such package", "pip install 'contactverif[ngsolve]'")

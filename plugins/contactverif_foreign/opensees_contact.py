@@ -78,9 +78,19 @@ class OpenSeesContact:
 
 
 def opensees(*, penalty: float, kind: str) -> OpenSeesContact:
-    """Return an element of OpenSees: "nts" (zeroLengthContactNTS2D) or "interface" (zeroLengthInterface2D).
+    """Return a contact element of OpenSees, without friction.
 
-    The penalty is the normal stiffness Kn of a spring, a force per length. There is no friction.
+    Parameters
+    ----------
+    penalty : float
+        The normal stiffness Kn of a spring, a force per length.
+    kind : str
+        The element: "nts" (zeroLengthContactNTS2D) or "interface" (zeroLengthInterface2D).
+
+    Raises
+    ------
+    MisuseError
+        If there is no such element, or OpenSeesPy is not installed.
     """
     element = choose("kind", kind, _ELEMENTS)
     if find_spec("openseespy") is None:

@@ -242,20 +242,35 @@ _UEL = _Uel()
 
 def uel(
     *,
-    penalty: float,  # The stiffness, in PROPS(1): nodal or distributed, as the trait `penalty` says.
-    file: str,  # The shared library, absolute or relative to the working folder.
-    # 3: a slave node and its nearest master segment. 4: a slave and a master segment that overlap. "n": a slave and a
-    # master chain; JPROPS holds the numbers of their nodes, and 1 for each that is closed.
+    penalty: float,
+    file: str,
     nodes: int | str = 3,
-    svars: int = 0,  # The number of state variables, zero before each call.
-    # The properties from PROPS(3) on, with ":" between them. PROPS(2) is the reference length of the slave part: half
-    # of the segments at a slave node, the slave segment, or the slave chain.
+    svars: int = 0,
     props: float | str = "",
-    # A TOML file with the traits. Without it the file counts that lies beside the library, see `traits_beside`.
     traits: str = "",
-    tau: float = 1e-2,  # The part of a master segment by which a foot may lie past its free end and still count.
+    tau: float = 1e-2,
 ) -> UserElement:
-    """Load a user element of Abaqus (UEL) from a shared library."""
+    """Load a user element of Abaqus (UEL) from a shared library.
+
+    Parameters
+    ----------
+    penalty : float
+        The stiffness, in PROPS(1): nodal or distributed, as the trait `penalty` says.
+    file : str
+        The shared library, absolute or relative to the working folder.
+    nodes : int | str
+        3: a slave node and its nearest master segment. 4: a slave and a master segment that overlap. "n": a slave and a
+        master chain; JPROPS holds the numbers of their nodes, and 1 for each that is closed.
+    svars : int
+        The number of state variables, zero before each call.
+    props : float | str
+        The properties from PROPS(3) on, with ":" between them. PROPS(2) is the reference length of the slave part: half
+        of the segments at a slave node, the slave segment, or the slave chain.
+    traits : str
+        A TOML file with the traits. Without it the file counts that lies beside the library, see `traits_beside`.
+    tau : float
+        The part of a master segment by which a foot may lie past its free end and still count.
+    """
     return _load_element(_UEL, "uel", penalty, file, nodes, svars, props, traits, tau)
 
 
@@ -307,15 +322,31 @@ _FEAP, _MOST_ELEMENTS = _Feap(), 99
 
 def feap(
     *,
-    penalty: float,  # The stiffness, in d(1): nodal or distributed, as the trait `penalty` says.
+    penalty: float,
     file: str,
-    number: int = 1,  # The number NN of the subroutine `elmtNN`.
+    number: int = 1,
     nodes: int | str = 3,
-    props: float | str = "",  # The properties from d(3) on, with ":" between them. d(2) is the reference length.
+    props: float | str = "",
     traits: str = "",
     tau: float = 1e-2,
 ) -> UserElement:
-    """Load a user element of FEAP (elmtNN) from a shared library. What is not explained is as for `uel`."""
+    """Load a user element of FEAP (elmtNN) from a shared library.
+
+    Parameters
+    ----------
+    penalty : float
+        The stiffness, in d(1): nodal or distributed, as the trait `penalty` says.
+    file : str
+        The shared library, as for `uel`.
+    number : int
+        The number NN of the subroutine `elmtNN`.
+    nodes : int | str
+        3, 4 or "n", as for `uel`.
+    props : float | str
+        The properties from d(3) on, with ":" between them. d(2) is the reference length, as for `uel`.
+    traits, tau : str | float
+        As for `uel`.
+    """
     if isinstance(number, bool) or not isinstance(number, int) or not 1 <= number <= _MOST_ELEMENTS:
         raise MisuseError("option number", repr(number), f"a whole number from 1 to {_MOST_ELEMENTS}")
     return _load_element(_FEAP, f"elmt{number:02d}", penalty, file, nodes, 0, props, traits, tau)
